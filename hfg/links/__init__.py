@@ -1,16 +1,16 @@
 """Links: edges whose ends are in two programs, over any transport (rules L1 to L4).
 
-frames                what goes over the wire, written and read; whatever is wrong is refused there
-producer  <- peer     the exact link's sending end: numbers, windows, evidence, probes; what it knows of each consumer
+frames                the wire format, written and read; anything malformed is refused there
+producer  <- peer     the exact link's sending end: numbers, windows, evidence, probes; its state of each consumer
 consumer              the exact link's receiving end: order, repetitions, credits, fencing
-bounded               both ends of the link that may lose some and counts them
-running               the ends at work: over a session of a transport, on an event loop
-local                 straight from one process to another of the same host, beside a session
-offers                what programs that meet by a name say of themselves, and who fits whom
+bounded               both ends of the link that may lose tokens and counts them
+running               the ends in operation: over a session of a transport, on an event loop
+local                 directly between processes of one host, in addition to a session
+offers                what programs that connect by a name announce, and which of them match
 meeting               these programs: the publishing and the subscribing end
 
-All but `running`, `local` and `meeting` are plain state machines: frames, tokens and the time go in, frames and tokens
-come out.
+All except `running`, `local` and `meeting` are plain state machines: frames, tokens and the time go in, frames and
+tokens come out.
 """
 
 from hfg.links.bounded import BoundedConsumer, BoundedProducer

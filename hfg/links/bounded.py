@@ -1,8 +1,8 @@
-"""Both ends of the link that may lose tokens: it keeps their order, never waits, and counts what is gone (rule L2, P5).
+"""Both ends of the link that may lose tokens: it keeps their order, never waits, and counts losses (rule L2, P5).
 
-The sending end numbers and sends; the receiving end puts what comes in order into a queue with a policy. A gap in the
-numbers is a loss on the way, known when the next token comes. There is no word back. Knows no time; nothing that
-arrives can make it raise.
+The sending end numbers and sends tokens; the receiving end puts tokens that arrive in order into a queue with a policy.
+A gap in the numbers is a loss in transit, detected when the next token arrives. Nothing is sent back. Does not use
+time; no input can make it raise.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ __all__ = ["BoundedConsumer", "BoundedConsumerCounts", "BoundedProducer", "Bound
 
 
 class BoundedProducerCounts(msgspec.Struct):
-    """What has happened at the sending end.
+    """Counts at the sending end.
 
     Attributes:
       sent: tokens.
-      datagrams: that they went in.
+      datagrams: datagrams that contained them.
     """
 
     sent: int = 0
@@ -65,11 +65,11 @@ class BoundedProducer:
 
     @property
     def position(self) -> Position:
-        """That of the last token that was sent."""
+        """Position of the last token that was sent."""
         return Position(self.epoch, self._next - 1)
 
     def send(self, token: EncodedToken) -> int:
-        """Take the next token and give its number; it leaves with the next `flush`.
+        """Accept the next token. Return its number; it is sent with the next `flush`.
 
         Raises:
           MessageTooLarge: the value is too large for the transport, or its metadata for a header.
@@ -79,7 +79,7 @@ class BoundedProducer:
         return self._next - 1
 
     def flush(self) -> list[Outgoing]:
-        """Give what is to be sent now."""
+        """Return the datagrams to send now."""
         if not self._unsent:
             return []
         out: list[Outgoing] = []
@@ -94,17 +94,17 @@ class BoundedProducer:
 
 
 class BoundedConsumerCounts(msgspec.Struct):
-    """What has happened at the receiving end.
+    """Counts at the receiving end.
 
     Attributes:
-      received: tokens that were put into the queue, those that were dropped from it later among them.
-      lost: tokens that were lost on the way, by the gaps in their numbers.
-      dropped: tokens that the policy has dropped, for they were too many.
-      late: tokens that came behind later ones, or again; they are not taken.
-      streams: how often a producer began afresh.
-      refused: datagrams that are no frame, or whose payload does not fit their header.
+      received: tokens that were put into the queue, including those dropped later.
+      lost: tokens lost in transit, by the gaps in their numbers.
+      dropped: tokens dropped by the policy because the queue was full.
+      late: tokens that arrived after later ones, or again; they are ignored.
+      streams: how often a producer started over.
+      refused: datagrams that are not frames, or whose payload does not match their header.
       other_versions: datagrams of another version of the protocol.
-      stale: tokens of former lives of the producer.
+      stale: tokens of previous incarnations of the producer.
     """
 
     received: int = 0
@@ -121,15 +121,15 @@ class BoundedConsumer:
     """The receiving end of a link that may lose tokens.
 
     Args:
-      capacity: how many tokens wait at most.
-      overflow: what becomes of one too many, in the words of rule P5. Under `error` it is dropped and `overflowed` is
-        set: who emitted it is far away, so it is for the consuming side to fail.
-      producer: the only epoch to believe, if somebody knows; else the newest that is heard of.
+      capacity: maximum number of waiting tokens.
+      overflow: what to do with a token when the queue is full, in the terms of rule P5. Under `error` it is dropped and
+        `overflowed` is set: its emitter is in another program, so the consuming side has to fail.
+      producer: the only trusted epoch, if known; otherwise the newest one that sends a message is trusted.
 
     Attributes:
-      counts: what has happened.
-      epoch: the life of the producer it listens to; 0: none yet.
-      overflowed: a token was too many under `error`.
+      counts: see the class.
+      epoch: the trusted incarnation of the producer; 0: none yet.
+      overflowed: the queue overflowed under `error`.
     """
 
     def __init__(
@@ -152,21 +152,21 @@ class BoundedConsumer:
         return len(self._waiting)
 
     def take(self) -> Delivery | None:
-        """Give the next token, if there is one."""
+        """Return the next token, if there is one."""
         return self._waiting.popleft() if self._waiting else None
 
     def take_all(self) -> list[Delivery]:
-        """Give all tokens that wait."""
+        """Return all waiting tokens."""
         taken = list(self._waiting)
         self._waiting.clear()
         return taken
 
     def forget_overflow(self) -> None:
-        """Who consumes has heard that a token was too many."""
+        """Reset `overflowed`: the consumer has been notified."""
         self.overflowed = False
 
     def believe(self, epoch: int) -> None:
-        """Listen to that life of the producer only, whatever else is heard."""
+        """Trust only this incarnation of the producer."""
         self._expected = epoch
 
     def receive(self, header: Buffer, payload: Buffer = b"") -> None:
@@ -190,7 +190,8 @@ class BoundedConsumer:
         values = values_of(frame, payload)
         if frame.epoch > self.epoch:
             self.counts.streams += self.epoch > 0
-            # Of a producer that was there before this end nothing is known to be lost; of a new one the beginning is.
+            # For a producer that was there before this end, no earlier loss is known; for a new one, missing first
+            # tokens are losses.
             self._last = 0 if self.epoch else frame.first - 1
             self.epoch = frame.epoch
         known = min(max(self._last + 1 - frame.first, 0), count)

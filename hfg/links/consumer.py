@@ -1,11 +1,11 @@
 """The receiving end of an exact link: order, repetitions, credits and fencing (rules L1 to L4).
 
-It takes tokens in their order and each once, whatever the way between does, tells what it has got, what is done and
-what it has room for, and believes only the newest life of the producer. It speaks when something is new or was asked,
-never by itself, so it needs no time.
+It accepts each token once and in order, whatever the network does. It reports what has arrived, what is processed and
+how many tokens it has room for, and trusts only the newest incarnation of the producer. It sends only when there is
+news or when it was probed, never spontaneously, so it needs no time.
 
-What this machine does not know: how datagrams travel, what a token is, and what a ledger is but for the position that
-it begins with. Nothing that arrives can make it raise.
+This machine does not know how datagrams travel or what a token is, and of a ledger only the position that it starts
+with. No input can make it raise.
 """
 
 from __future__ import annotations
@@ -33,23 +33,23 @@ __all__ = ["ConsumerCounts", "ExactConsumer"]
 
 
 class ConsumerCounts(msgspec.Struct):
-    """What has happened at the receiving end.
+    """Counts at the receiving end.
 
     Attributes:
       received: tokens that were accepted.
       repeated: tokens that had been accepted before.
-      early: tokens that came before others, or before it was told where the producer stands; they will come again.
-      overrun: tokens that there was no room for; they will come again.
-      missed: tokens that were done by the producer's account and not by this one's: the ledger is behind, or older
-        tokens were given up while this consumer did not take part.
-      abandoned: tokens of a dead producer that are known to have existed and will never come.
-      streams: how often a producer began afresh.
-      statuses: that were sent.
-      refused: datagrams that are no frame, or whose payload does not fit their header.
+      early: tokens that arrived before earlier ones, or before the producer's position was known; they will be resent.
+      overrun: tokens for which there was no room; they will be resent.
+      missed: tokens that are processed according to the producer but not according to this end: the ledger is behind,
+        or older tokens were dropped while this consumer did not take part.
+      abandoned: tokens of a dead producer that are known to have existed and will never arrive.
+      streams: how often a producer started over.
+      statuses: statuses sent.
+      refused: datagrams that are not frames, or whose payload does not match their header.
       other_versions: datagrams of another version of the protocol.
-      strangers: probes for others.
-      stale: frames of former lives of the producer, or for former lives of this consumer.
-      fenced: frames that say that a newer life of this consumer is at work.
+      strangers: probes for other consumers.
+      stale: frames of previous incarnations of the producer, or for previous incarnations of this consumer.
+      fenced: frames that show that a newer incarnation of this consumer is running.
     """
 
     received: int = 0
@@ -71,19 +71,21 @@ class ExactConsumer:
     """The receiving end of an exact link.
 
     Args:
-      name: by which the producer knows it.
-      incarnation: which life of the consumer this is; each must be higher than all before.
-      capacity: how many tokens it holds that are not done; no less than the producer's window, or it slows it down.
-      ledger: the position of the last token that was done, if that was recorded.
-      producer: the only epoch to believe, if somebody knows; else the newest that is heard of.
+      name: its name at the producer.
+      incarnation: number of this incarnation of the consumer; must be higher than all previous ones.
+      capacity: maximum number of tokens that have arrived and are not processed; at least the producer's window, or it
+        slows the producer down.
+      ledger: position of the last processed token, if recorded.
+      producer: the only trusted epoch, if known; otherwise the newest one that sends a message is trusted.
 
     Attributes:
       name: see above.
       incarnation: see above.
       capacity: see above.
-      counts: what has happened.
-      epoch: the life of the producer it listens to; 0: none yet.
-      newer_incarnation: that of a newer life of this consumer, by which the producer has fenced this one off; or 0.
+      counts: see `ConsumerCounts`.
+      epoch: the trusted incarnation of the producer; 0: none yet.
+      newer_incarnation: number of a newer incarnation of this consumer, for which the producer has fenced this one off;
+        or 0.
       closed: the producer has ended the link.
     """
 
@@ -134,28 +136,28 @@ class ExactConsumer:
 
     @property
     def untold(self) -> int:
-        """How many tokens are done that the producer was not told of."""
+        """Number of processed tokens that were not reported to the producer yet."""
         return self._done - self._told
 
     @property
     def position(self) -> Position:
-        """That of the last token that is done, in the stream that is followed now."""
+        """Position of the last processed token, in the current stream."""
         return Position(self._stream, self._done)
 
     @property
     def accepted(self) -> Position:
-        """That of the last token that has arrived."""
+        """Position of the last token that has arrived."""
         return Position(self._stream, self._accepted)
 
     def take(self) -> Delivery | None:
-        """Give the next token, if there is one."""
+        """Return the next token, if there is one."""
         if not self._waiting:
             return None
         self._taken += 1
         return self._waiting.popleft()
 
     def take_all(self) -> list[Delivery]:
-        """Give all tokens that wait."""
+        """Return all waiting tokens."""
         taken = list(self._waiting)
         self._waiting.clear()
         self._taken += len(taken)
@@ -173,18 +175,19 @@ class ExactConsumer:
         older = min(self._older, count)
         self._older -= older
         self._done += count - older
-        # A producer that waits needs the word now; else it has room still, and one word for several is cheaper.
+        # If no tokens wait here, the producer may be blocked and needs the acknowledgement now. Otherwise it still has
+        # room, and one status for several tokens is cheaper.
         if (count and not self._waiting) or older or 4 * (self._done - self._told) >= self.capacity:
             self._owes = True
 
     def believe(self, epoch: int) -> None:
-        """Listen to that life of the producer only, whatever else is heard."""
+        """Trust only this incarnation of the producer."""
         self._expected = epoch
 
     # --- what arrives
 
     def receive(self, header: Buffer, payload: Buffer = b"") -> None:
-        """Take a datagram of the producer; `take` gives the tokens, `flush` the answer."""
+        """Process a datagram from the producer; then `take` returns the tokens, `flush` the answer."""
         try:
             frame = read_from_producer(header)
             if type(frame) is Tokens:
@@ -205,14 +208,17 @@ class ExactConsumer:
             self._seen = frame.serial
         known = self._accepted + 1 - frame.first
         if known < 0:
+            # Not kept: the status shows the gap and the producer resends. Keeping early tokens would need memory that
+            # the credits do not account for.
             self.counts.early += count
             self._owes = True
             return
         if known >= count:
+            # Answered all the same: a repetition means that the producer has lost our acknowledgement.
             self.counts.repeated += count
             self._owes = True
             return
-        values = values_of(frame, payload)
+        values = values_of(frame, payload)  # may raise Unreadable, so it comes before any change
         room = self.capacity - self._taken - len(self._waiting)
         stop = min(count, known + room)
         self.counts.repeated += known
@@ -233,7 +239,7 @@ class ExactConsumer:
         if frame.epoch < self.epoch or not self._believes(frame.epoch):
             self.counts.stale += count
         else:
-            self._owes = True  # so that the producer tells where it stands, or hears that this stream is over
+            self._owes = True  # so that the producer sends its position, or learns that this stream is over
             if frame.epoch == self.epoch and frame.stream < self._stream:
                 self.counts.stale += count
             else:
@@ -248,18 +254,22 @@ class ExactConsumer:
         elif not self._believes(probe.epoch) or probe.epoch < self.epoch:
             self.counts.stale += 1
         elif probe.incarnation != self.incarnation:
+            # A newer incarnation has our name, so we must stop: if both processed and acknowledged tokens, some would
+            # be processed twice and others by the one whose effects are discarded (L2).
             if probe.incarnation > self.incarnation:
                 self.counts.fenced += 1
                 self.newer_incarnation = max(self.newer_incarnation, probe.incarnation)
             else:
                 self.counts.stale += probe.incarnation > 0
-                self._owes = True  # so that the producer hears which life this is
+                self._owes = True  # so that the producer learns the incarnation of this end
         else:
             self._follow(probe)
             self._owes = True
 
     def _follow(self, probe: Probe) -> None:
-        """The producer says to this very life of the consumer where it stands."""
+        """Follow a probe for this incarnation of the consumer, which has the producer's position."""
+        # Only a probe changes the epoch, never a token: a probe for this incarnation shows that the producer knows us
+        # and states its position, so no token can be skipped in between.
         if probe.epoch > self.epoch:
             self.epoch = probe.epoch
             self._seen = 0
@@ -283,23 +293,26 @@ class ExactConsumer:
         self.closed = self.closed or probe.closing
 
     def _go_on_after(self, number: int) -> None:
-        """Numbers go on from elsewhere; what has arrived and is not done stays, before what comes."""
+        """Continue with other numbers. Tokens that have arrived and are not processed stay ahead of new ones."""
+        # They have no number in the new stream, so `done` must not count them there; but they still occupy room.
         self._older = self.unfinished
         self._accepted = self._done = self._told = number
 
     # --- what leaves
 
     def flush(self) -> list[Outgoing]:
-        """Give what is to be sent now, at most one status.
+        """Return the datagrams to send now: at most one status.
 
-        To be called when something was done or has arrived, at the end of a burst of either, and once at the beginning.
+        Call it after tokens were processed or datagrams arrived, at the end of each burst, and once at the start.
         """
         if not self._owes:
             return []
         self._owes = False
         self._told = self._done
         self.counts.statuses += 1
+        # Never below what has already been accepted: a limit that shrinks would contradict an earlier status.
         limit = self._done + max(self.capacity - self._older, self._accepted - self._done)
+        assert limit >= self._accepted >= self._done, "a status would contradict itself"
         status = Status(
             self.name, self.incarnation, self.epoch, self._stream, self._accepted, self._done, limit, self._seen
         )

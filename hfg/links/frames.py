@@ -1,8 +1,8 @@
-"""What a link puts on the wire: headers in msgpack, read by type and never trusted (rule L4).
+"""The wire format of links: headers in msgpack, read by type and never trusted (rule L4).
 
-A header is an array that begins with a number which says both what it is and by which version of the protocol, so that
-another version is recognised before anything of it is read. Tokens go in runs of consecutive numbers: the header holds
-what is small about each, the payload is their values. All limits are here. Stands on the contract alone.
+A header is an array that starts with a number for both its kind and the protocol version, so that another version is
+recognised before anything else is read. Tokens are sent in runs of consecutive numbers: the header has the small parts
+of each, the payload has their values. All limits are defined here. Depends only on the contract.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ LONGEST_METADATA: Final = 4096
 """Bytes of what is small about a token."""
 LONGEST_NAME: Final = 512
 """Characters of a consumer's name."""
-_LARGEST: Final = 2**62  # so that sums of two stay in 64 bits, whoever reads them
-_TAG: Final = VERSION * 16  # the lower four bits say what it is
+_LARGEST: Final = 2**62  # so that the sum of two stays within 64 bits in any implementation
+_TAG: Final = VERSION * 16  # the lower four bits are the kind
 
 Number: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=_LARGEST)]
 Name: TypeAlias = Annotated[str, msgspec.Meta(max_length=LONGEST_NAME)]
@@ -52,11 +52,11 @@ Metadata: TypeAlias = Annotated[bytes, msgspec.Meta(max_length=LONGEST_METADATA)
 
 
 class Unreadable(Exception):
-    """The datagram is no frame of a link."""
+    """The datagram is not a frame of a link."""
 
 
 class OtherVersion(Unreadable):
-    """It may be one, of a version of the protocol that is not this one."""
+    """It may be a frame of another version of the protocol."""
 
 
 class Outgoing(NamedTuple):
@@ -77,11 +77,11 @@ class Tokens(msgspec.Struct, array_like=True, frozen=True, gc=False, tag=_TAG + 
     """A run of tokens with consecutive numbers; the payload has their values.
 
     Attributes:
-      epoch: which life of the producer this is.
-      stream: which numbering; see `Position`.
+      epoch: incarnation of the producer.
+      stream: number of the stream; see `Position`.
       first: the number of the first of them.
-      serial: counts what the producer has sent, so that it can tell what is known of by when.
-      metadata: of each token.
+      serial: counts the producer's datagrams, so that it can tell which of them a status has taken into account.
+      metadata: the small parts of each token.
     """
 
     epoch: Number
@@ -92,18 +92,18 @@ class Tokens(msgspec.Struct, array_like=True, frozen=True, gc=False, tag=_TAG + 
 
 
 class Probe(msgspec.Struct, array_like=True, frozen=True, gc=False, tag=_TAG + 2):
-    """The producer tells one consumer where it stands and wants its status.
+    """The producer tells one consumer its position and asks for a status.
 
     Attributes:
-      consumer: whom it is for.
-      incarnation: which life of the consumer it is for; 0: none is known.
-      epoch: which life of the producer this is.
-      stream: which numbering is in use.
-      lowest: the first number that this consumer may still get; all before are done, or gone.
-      highest: the last number there is.
+      consumer: the receiver's name.
+      incarnation: incarnation of the consumer; 0: unknown.
+      epoch: incarnation of the producer.
+      stream: number of the current stream.
+      lowest: the first number that this consumer may still get; earlier ones are processed or gone.
+      highest: the last number in use.
       serial: as with `Tokens`.
-      eager: what was accepted is to be told at once, not only what is done.
-      closing: there will be no more.
+      eager: report accepted tokens at once, not only processed ones.
+      closing: there will be no more tokens.
     """
 
     consumer: Name
@@ -118,13 +118,13 @@ class Probe(msgspec.Struct, array_like=True, frozen=True, gc=False, tag=_TAG + 2
 
 
 class Status(msgspec.Struct, array_like=True, frozen=True, gc=False, tag=_TAG + 3):
-    """A consumer tells where it stands: acknowledgement, credit and evidence of what is missing, all in one.
+    """A consumer's position: acknowledgement, credit and evidence of missing tokens, all in one.
 
     Attributes:
       consumer: its name.
-      incarnation: which life of it this is.
-      epoch: the life of the producer it listens to; 0: none yet.
-      stream: the numbering it follows; 0: none yet.
+      incarnation: its incarnation.
+      epoch: the incarnation of the producer that it trusts; 0: none yet.
+      stream: number of the stream that it follows; 0: none yet.
       accepted: all up to this number have arrived.
       done: all up to this number are processed and recorded.
       limit: it has room for tokens up to this number.
@@ -151,23 +151,23 @@ _read_consumers: Final = msgspec.msgpack.Decoder(FromConsumer)
 _read_values: Final = msgspec.msgpack.Decoder(Annotated[list[bytes], msgspec.Meta(max_length=MOST_TOKENS)])
 
 write: Final = _encoder.encode
-"""Gives a frame as the header of a datagram."""
+"""Returns a frame as the header of a datagram."""
 
 
 def read_from_producer(header: Buffer) -> FromProducer:
-    """Read what a consumer has got.
+    """Read a frame that a consumer has received.
 
     Raises:
-      Unreadable: it is no such frame.
+      Unreadable: it is not such a frame.
     """
     return _read(_read_producers, header)
 
 
 def read_from_consumer(header: Buffer) -> FromConsumer:
-    """Read what a producer has got.
+    """Read a frame that a producer has received.
 
     Raises:
-      Unreadable: it is no such frame.
+      Unreadable: it is not such a frame.
     """
     return _read(_read_consumers, header)
 
@@ -180,7 +180,7 @@ def _read(decoder: msgspec.msgpack.Decoder[Frame], header: Buffer) -> Frame:
 
 
 def _what_is_wrong(header: Buffer) -> Unreadable:
-    """An array that begins with a whole number of another version; the rest of it may be anything."""
+    """Return the error for a header: `OtherVersion` if it starts with another version's number, whatever follows."""
     view = memoryview(header)
     start = view[1] if len(view) > 1 and 0x90 <= view[0] <= 0x9F else 0
     if start in range(16, 128) and start // 16 != VERSION:
@@ -189,7 +189,7 @@ def _what_is_wrong(header: Buffer) -> Unreadable:
 
 
 def checked(token: EncodedToken, largest: int) -> EncodedToken:
-    """Give a token as it can be sent: its value in plain bytes, whose number is their length.
+    """Return a token in the form for sending: its value as plain bytes, whose item count is their length.
 
     Raises:
       MessageTooLarge: it is larger than a transport carries, or its metadata than a header holds.
@@ -207,10 +207,10 @@ def checked(token: EncodedToken, largest: int) -> EncodedToken:
 
 
 def values_of(frame: Tokens, payload: Buffer) -> list[Buffer]:
-    """Give the values of a run of tokens; a single one is the payload itself, not copied.
+    """Return the values of a run of tokens; a single value is the payload itself, not copied.
 
     Raises:
-      Unreadable: they are not as many as the header says.
+      Unreadable: their number differs from the header's.
     """
     if len(frame.metadata) == 1:
         return [payload]
@@ -224,11 +224,11 @@ def values_of(frame: Tokens, payload: Buffer) -> list[Buffer]:
 
 
 def batches(tokens: list[EncodedToken], largest: int) -> Iterator[tuple[list[bytes], Buffer]]:
-    """Part a run of tokens into datagrams: the metadata and the payload of each.
+    """Split a run of tokens into datagrams. Yield metadata and payload of each.
 
     Args:
       tokens: at least one.
-      largest: the bytes of a datagram of several tokens; a token that is larger goes alone.
+      largest: maximum bytes of a datagram of several tokens; a larger token gets a datagram of its own.
     """
     metadata = [token[0] for token in tokens]
     values = [token[1] for token in tokens]

@@ -1,13 +1,13 @@
-"""What programs that meet by a name say of themselves, and whether two of them fit (rule L4).
+"""The announcements of programs that connect by a name, and whether two of them match (rule L4).
 
-Everybody who publishes or subscribes is announced on the transport, below the name that they share:
+Every publisher and subscriber is announced on the transport, below the name that they share:
 
-    hfg/named/NAME/PUBLISHER/offer          somebody publishes
-    hfg/named/NAME/PUBLISHER/end            what he published has ended
-    hfg/named/NAME/PUBLISHER/join CONSUMER  somebody takes part in what he publishes
+    hfg/named/NAME/PUBLISHER/offer          a publisher
+    hfg/named/NAME/PUBLISHER/end            its stream has ended
+    hfg/named/NAME/PUBLISHER/join CONSUMER  a subscriber of it
 
-with what he says of himself. Publishers and consumers have an identity for each life, drawn at random, so one that
-returns is another and nobody has to know whose life is newer. Pure: stands on the encoding of types.
+together with a description. Publishers and consumers have a random identity per incarnation, so one that returns is a
+new one, and it does not matter which incarnation is newer. Pure functions; depends on the encoding of types.
 """
 
 from __future__ import annotations
@@ -30,14 +30,15 @@ What: TypeAlias = Literal["offer", "end", "join"]
 
 
 class Introduction(msgspec.Struct, frozen=True, array_like=True):
-    """What somebody says of himself.
+    """The description of a publisher or consumer.
 
     Attributes:
-      version: of what is said here and on the links.
-      who: for people: which graph, in which process, on which host.
-      fingerprint: of the type.
-      lossless: a publisher: whether he waits for those who want every value; a consumer: whether he wants every one.
-      type: its description; empty where it is too long to be said.
+      version: version of the protocol, here and on the links.
+      who: for messages: graph, process and host.
+      fingerprint: fingerprint of the type.
+      lossless: of a publisher: whether it waits for consumers that want every value; of a consumer: whether it wants
+        every value.
+      type: description of the type; empty if it is too long.
       stream: a publisher with an outbox: what all his lives publish, so that nobody takes a value twice; else empty.
     """
 
@@ -54,10 +55,10 @@ _decode: Final = msgspec.msgpack.Decoder(Introduction).decode
 
 
 def introduce(hint: Any, who: str, *, lossless: bool, stream: str = "") -> bytes:
-    """Give what is announced.
+    """Return the announcement.
 
     Raises:
-      EncodingError: values of this type cannot cross.
+      EncodingError: values of this type cannot be sent to another process.
     """
     described = description_of(hint)
     said = described if len(described) <= _LONGEST_TYPE else ""
@@ -65,7 +66,7 @@ def introduce(hint: Any, who: str, *, lossless: bool, stream: str = "") -> bytes
 
 
 def read_introduction(metadata: bytes) -> Introduction | None:
-    """Give what was announced, or None if it is nothing of the kind: it may come from anybody."""
+    """Return the announcement, or None if it is not valid: any program may have sent it."""
     try:
         return cleaned(_decode(metadata))
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
@@ -73,12 +74,12 @@ def read_introduction(metadata: bytes) -> Introduction | None:
 
 
 class Seen(NamedTuple):
-    """What an announced name says.
+    """The contents of an announced name.
 
     Attributes:
-      publisher: whom it is about.
-      what: what it says of him.
-      consumer: who takes part; "" else.
+      publisher: the publisher that it is about.
+      what: the kind of announcement.
+      consumer: the consumer that takes part, or "".
     """
 
     publisher: str
@@ -87,26 +88,26 @@ class Seen(NamedTuple):
 
 
 def need_link_name(name: str) -> str:
-    """Give the name back.
+    """Return the name if it is valid.
 
     Raises:
-      UsageError: it is none.
+      UsageError: it is not a valid name.
     """
     if not all(name.split("/")) or len(name) > _LONGEST_NAME:
         raise UsageError(
-            f'"{name:.80}" is no name to meet by: write words with "/" between them, as in "camera/front", '
-            f"at most {_LONGEST_NAME} characters"
+            f'"{name:.80}" is not a valid name for publishing: write words with "/" between them, as in '
+            f'"camera/front", at most {_LONGEST_NAME} characters'
         )
     return name
 
 
 def key_of(name: str, publisher: str = "") -> str:
-    """Give what everything about a name begins with, or everything about one publisher of it."""
+    """Return the common prefix of all keys of a name, or of one publisher of it."""
     return f"hfg/named/{name}/{publisher}" if publisher else f"hfg/named/{name}"
 
 
 def read_name(name: str, announced: str) -> Seen | None:
-    """Give what an announced name says of who meets by `name`; None if it is about another, longer name."""
+    """Return the contents of an announced name below `name`; None if it belongs to another, longer name."""
     publisher, slash, rest = announced.removeprefix(f"{key_of(name)}/").partition("/")
     what, _, consumer = rest.partition(" ")
     if not slash or "/" in rest or what not in ("offer", "end", "join") or (what == "join") != bool(consumer):
@@ -115,23 +116,26 @@ def read_name(name: str, announced: str) -> Seen | None:
 
 
 def unfit(hint: Any, publisher: Introduction, consumer: Introduction, *, here: Literal["publisher", "consumer"]) -> str:
-    """Say why a consumer cannot take part in what is published, and what to do; "" if he can.
+    """Return why a consumer cannot subscribe to a publisher, and what to do; "" if it can.
 
     Args:
-      hint: the type of this end.
-      publisher: what he says of himself.
-      consumer: the same.
-      here: which of them is at this end.
+      hint: type of this end.
+      publisher: its description.
+      consumer: its description.
+      here: which of the two is at this end.
     """
     theirs = consumer if here == "publisher" else publisher
     if publisher.version != consumer.version:
-        return f"it speaks version {theirs.version} of this protocol, and this end {VERSION}; install the same hfg"
+        return (
+            f"it uses version {theirs.version} of this protocol, and this end {VERSION}; install the same version "
+            "of hfg"
+        )
     if publisher.fingerprint != consumer.fingerprint:
         return f"the types differ: {_difference(hint, theirs)}; declare the same type at both ends"
     if consumer.lossless and not publisher.lossless:
         whose = ("the subscriber wants", "subscribe there") if here == "publisher" else ("this end wants", "subscribe")
         return (
-            f"it is published with lossless=False, which waits for nobody, and {whose[0]} every value; "
+            f"it is published with lossless=False, which waits for no subscriber, but {whose[0]} every value; "
             f'{whose[1]} with overflow="latest", or publish with lossless=True'
         )
     return ""
@@ -141,4 +145,4 @@ def _difference(hint: Any, theirs: Introduction) -> str:
     try:
         return (difference(hint, theirs.type) if theirs.type else None) or "somewhere deep inside"
     except EncodingError:
-        return "what the other end says of its type cannot be read"
+        return "the other end's description of its type cannot be read"

@@ -1,6 +1,6 @@
-"""What the producer of an exact link knows of one of its consumers.
+"""The producer's state of one consumer of an exact link.
 
-Changed by its own methods alone, each of which says what has happened. Stands on `frames`.
+Changed only by its own methods, each of which is one event. Depends on `frames`.
 """
 
 from __future__ import annotations
@@ -11,24 +11,25 @@ __all__ = ["Peer"]
 
 
 class Peer:
-    """One consumer, as its statuses have told.
+    """One consumer, according to its statuses.
 
     Attributes:
       name: its name on the link.
-      incarnation: which life of it is believed; 0: it was never heard of.
-      expected: the only incarnation to believe, or None for the newest that is heard of.
-      in_step: this life of it follows this epoch and stream: it is sent tokens. Others are only probed.
-      accepted: what it has got.
-      done: what it has processed; never goes back.
-      limit: what it has room for.
-      sent: what was sent to it and is not known to be lost.
-      last_serial: of what carried the last of those; a status that has seen it and lacks some proves them lost.
-      owed: it is to be probed at once.
-      since: when something was last sent to it or learnt of it.
-      patience_s: how long after that it is probed.
-      answers: something was heard of it since it was last probed.
-      silent: it was probed again, for it had not answered.
-      unanswered: how often in a row it was probed and did not answer.
+      incarnation: its trusted incarnation; 0: it has not sent anything yet.
+      expected: the only trusted incarnation, or None for the newest one that sends a message.
+      in_step: this incarnation follows the current epoch and stream, so tokens are sent to it. Others are only probed.
+      accepted: number of the last token that has arrived there.
+      done: number of the last token that it has processed; never decreases.
+      limit: it has room for tokens up to this number.
+      sent: number of the last token that was sent to it and is not known to be lost.
+      last_serial: serial number of the datagram with that token; a status that has seen it and lacks tokens proves them
+        lost.
+      owed: probe it at once.
+      since: when a token was last sent to it, or it last sent news.
+      patience_s: how long after `since` it is probed.
+      answers: it has sent a message since it was last probed.
+      silent: it was probed again because it had not answered.
+      unanswered: number of consecutive probes without an answer.
     """
 
     __slots__ = (
@@ -78,35 +79,37 @@ class Peer:
             self.owe()
 
     def begin(self, incarnation: int) -> None:
-        """It has come back: what it had accepted and not done is gone with its former life."""
+        """Start over with a new incarnation: tokens that the previous one had accepted and not processed are gone."""
         self.incarnation = incarnation
         self.fall_out()
 
     def fall_out(self) -> None:
-        """It has to be told where the producer stands before it can be sent anything."""
+        """Stop sending tokens to it until it knows the producer's position."""
         self.in_step = False
+        # Back to `done`: what was accepted and not processed died with it, so these tokens must be sent again.
         self.accepted = self.limit = self.sent = self.done
         self.last_serial = 0
 
     def step_in(self, accepted: int) -> None:
-        """It knows where the producer stands, and has so much."""
+        """Start sending tokens: it knows the producer's position and has accepted tokens up to `accepted`."""
         self.in_step = True
         self.accepted = self.sent = accepted
 
     def move_to(self, done: int) -> None:
-        """The numbers go on from elsewhere."""
+        """Continue with other numbers."""
         self.give_up(done)
         self.owe()
 
     def give_up(self, done: int) -> None:
-        """Nothing up to there is wanted by it any more, nor need it be told."""
+        """Mark everything up to `done` as no longer wanted; no need to report it."""
         self.done = done
         self.fall_out()
         self.owed = False
 
     def learn(self, status: Status) -> bool:
-        """It says what it has, what is done and what it lacks; give whether that is news."""
+        """Process a status: what it has, what it has processed and what it lacks. Return whether this is news."""
         news = status.accepted > self.accepted or status.done > self.done or status.limit > self.limit
+        # Statuses may overtake each other, so every number only grows; an old status changes nothing.
         self.accepted = max(self.accepted, status.accepted)
         self.limit = max(self.limit, status.limit)
         if status.seen >= self.last_serial and self.accepted < self.sent:
@@ -118,11 +121,11 @@ class Peer:
         return news
 
     def owe(self) -> None:
-        """It is to be probed at once."""
+        """Probe it at once."""
         self.owed = True
 
     def heard(self) -> None:
-        """There was a word of it, whatever it says; after a silence the next one is not taken for a long one."""
+        """It has sent a message, whatever the contents. The first message after a silence also resets the patience."""
         self.answers = True
         self.unanswered = 0
         if self.silent:
@@ -134,16 +137,17 @@ class Peer:
         self.patience_s = self._shortest_s
 
     def carry(self, last: int, serial: int, now: float) -> None:
-        """It was sent all up to that number, the last of it by that datagram."""
+        """It was sent all tokens up to `last`, the last one with datagram `serial`."""
         self.sent = max(self.sent, last)
         self.last_serial = serial
         self.since = now
 
     def probed(self, now: float, slowest_s: float) -> None:
-        """It is asked; if it was silent, the next time later."""
+        """It was probed. If it was silent, the next probe comes later."""
         if not self.owed:
             self.silent = not self.answers
             self.unanswered += not self.answers
+            # Doubling keeps probes to a dead consumer rare; the upper bound keeps the detection of its return fast.
             self.patience_s = min(2 * self.patience_s, slowest_s)
         self.owed = self.answers = False
         self.since = now

@@ -1,11 +1,11 @@
 """The sending end of an exact link: numbers, windows, resends on evidence, probes (rules L1 to L3).
 
-Tokens are kept until every consumer has said that they are done. They are sent once to all; a second time only to a
-consumer whose status shows that it lacks them although it has seen what was sent after them, or which has begun a new
-life. One that is silent is asked by a small probe, less and less often, and never sent a large value to be sure.
+Tokens are kept until every consumer has acknowledged them. They are sent once to all consumers. They are sent again
+only to a consumer whose status proves that it lacks them although it has seen later datagrams, or that has started a
+new incarnation. A silent consumer gets small probes, less and less often, but never a large value just to be sure.
 
-What this machine does not know: time but as an argument, how datagrams travel, and what a token is. Nothing that
-arrives can make it raise.
+This machine gets the time only as an argument, and does not know how datagrams travel or what a token is. No input from
+the network can make it raise.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ from hfg.transport import Buffer, EncodedToken, Position
 __all__ = ["ExactProducer", "Outbox", "ProducerCounts"]
 
 _AWAY: Final = 4
-"""So many probes in a row without an answer, about a second, and a consumer is said to be away."""
+"""Number of consecutive probes without an answer, about a second, after which a consumer is reported as away."""
 
 
 class Outbox(NamedTuple):
-    """What a producer kept of its former life, so that nothing of it is lost.
+    """The unacknowledged tokens of a producer's previous incarnation.
 
     Attributes:
-      stream: the numbering that is carried on.
+      stream: the stream to continue.
       first: the number of the first token, or of the next one if there is none.
-      tokens: what was not done, as far as is known.
+      tokens: tokens that are not acknowledged, as far as known.
     """
 
     stream: int
@@ -55,23 +55,23 @@ class Outbox(NamedTuple):
 
 
 class ProducerCounts(msgspec.Struct):
-    """What has happened at the sending end.
+    """Counts at the sending end.
 
     Attributes:
       sent: tokens that were sent for the first time.
       resent: tokens that were sent again, to each consumer that lacked them.
-      datagrams: that were put, probes among them.
-      probes: that were put.
-      restarts: new lives of consumers.
-      given_up: tokens that were not done when the link was closed or a consumer dismissed.
-      superseded: tokens that no consumer takes any more, since it follows a newer stream.
-      repeated: tokens that were sent before, by their positions; nothing became of them.
-      refused: datagrams that are no frame, or acknowledge what was never sent.
+      datagrams: datagrams sent, including probes.
+      probes: probes sent.
+      restarts: new incarnations of consumers.
+      given_up: tokens that were not acknowledged when the link was closed or a consumer dismissed.
+      superseded: tokens that a consumer no longer takes because it follows a newer stream.
+      repeated: tokens that had already been sent, by their positions; they were ignored.
+      refused: datagrams that are not frames, or acknowledge tokens that were never sent.
       other_versions: datagrams of another version of the protocol.
       strangers: frames of consumers that do not take part.
-      stale: frames of former lives of a consumer.
+      stale: frames of previous incarnations of a consumer.
       late: frames that were overtaken by newer ones.
-      fenced: frames that say that a newer life of this producer is at work.
+      fenced: frames that show that a newer incarnation of this producer is running.
     """
 
     sent: int = 0
@@ -94,21 +94,21 @@ class ExactProducer:
     """The sending end of an exact link to one or several consumers.
 
     Args:
-      epoch: which life of the producer this is; each must be higher than all before.
+      epoch: number of this incarnation of the producer; must be higher than all previous ones.
       window: how many tokens may be unreleased, P4's buffer; 1 is the paper's rule.
-      release: what frees the producer's output: that a token is done or, for slots, accepted.
-      depth: with `release="accepted"`, how many more may be accepted and not done yet.
-      inherits: the positions of tokens are given with them; the first one begins the numbering.
-      outbox: what was kept of the former life.
+      release: what frees the producer's output: a token is processed ("done") or, for slots, accepted.
+      depth: with `release="accepted"`, how many more tokens may be accepted and not yet processed.
+      inherits: tokens come with their positions; the first one starts the numbering.
+      outbox: tokens from the previous incarnation.
       largest_batch: bytes of a datagram of several tokens.
       largest_token: bytes of a value and its metadata that can be sent at all.
       probe_s: how long a consumer may be silent before it is probed.
-      slowest_probe_s: to what the time between two probes grows while nothing is heard.
+      slowest_probe_s: maximum time between two probes of a silent consumer.
 
     Attributes:
-      counts: what has happened.
+      counts: see `ProducerCounts`.
       window: see above.
-      newer_epoch: that of a newer life of this producer, by which consumers have fenced this one off; or 0.
+      newer_epoch: number of a newer incarnation of this producer, for which consumers have fenced this one off; or 0.
     """
 
     def __init__(
@@ -138,8 +138,10 @@ class ExactProducer:
         self._largest_token = largest_token
         self._probe_s = probe_s
         self._slowest_probe_s = slowest_probe_s
+        # The epoch is the first stream, so that a producer that returns without an outbox starts a higher one: its
+        # numbers cannot be mistaken for those of its previous incarnation.
         kept = outbox or Outbox(0 if inherits else epoch, 1)
-        self._stream = kept.stream  # 0: not begun
+        self._stream = kept.stream  # 0: not started
         self._kept: deque[EncodedToken] = deque(kept.tokens)  # what is not done by all
         self._next = kept.first + len(kept.tokens)
         self._put = kept.first - 1  # what was sent to all, but for those out of step
@@ -165,7 +167,7 @@ class ExactProducer:
 
     @property
     def position(self) -> Position:
-        """That of the last token that was sent."""
+        """Position of the last token that was sent."""
         return Position(self._stream, self._next - 1)
 
     @property
@@ -175,7 +177,7 @@ class ExactProducer:
 
     @property
     def outbox(self) -> Outbox:
-        """What another life would need to carry on from here."""
+        """The state that another incarnation needs to continue from here."""
         return Outbox(self._stream, self._next - len(self._kept), tuple(self._kept))
 
     @property
@@ -184,19 +186,20 @@ class ExactProducer:
         return [peer.name for peer in self._peers.values() if peer.unanswered >= _AWAY]
 
     def is_pressing(self, portion: int) -> bool:
-        """Whether what was not sent should leave now: it is enough, or nothing is under way, or nothing can join it."""
+        """Return whether unsent tokens should leave now: they are enough, none is in transit, or none can join them."""
         unsent = self._next - 1 - self._put
         return unsent >= portion or unsent == len(self._kept) or self._next > self._limit
 
     def takes(self, position: Position | None = None) -> bool:
         """Whether a token of that position can be sent now: `free`, and where numbers jump all before is done."""
         if position is not None and tuple(position) >= (self._stream, self._next):
+            # A jump while tokens are kept would leave numbers without tokens in `_kept`, which is indexed by number.
             follows = position == (self._stream, self._next)
             return self.free if follows else not self._kept
         return self.free or position is not None
 
     def send(self, token: EncodedToken, position: Position | None = None) -> int:
-        """Take the next token and give its number; it leaves with the next `flush`.
+        """Accept the next token. Return its number; it is sent with the next `flush`.
 
         Raises:
           UsageError: the window is full, or the link is closed.
@@ -213,7 +216,7 @@ class ExactProducer:
             token = checked(token, self._largest_token)  # which most need not
         self._kept.append(token)
         self._next = number + 1
-        if number <= self._released or not self._peers:  # done before: a relay that began anew comes to it again
+        if number <= self._released or not self._peers:  # already processed: a relay that started over repeats it
             self._free()
         return number
 
@@ -229,11 +232,11 @@ class ExactProducer:
         if self._closed:
             return UsageError("the link is closed")
         if self._stream == 0:
-            return UsageError("this link inherits its numbers: give the position of the input with each token")
+            return UsageError("this link inherits its numbers: pass the position of the input with each token")
         return UsageError(f"the window of {self.window} tokens is full: look at `free` first, or await send()")
 
     def _begin_at(self, position: Position) -> bool:
-        """Whether a token of that position is new; numbers go on from there if they jump."""
+        """Return whether a token of this position is new. If the numbers jump, continue from there."""
         here = (self._stream, self._next)
         if position == here:
             return True
@@ -250,22 +253,23 @@ class ExactProducer:
         return True
 
     def admit(self, consumer: str, incarnation: int | None = None, *, after: int | None = None) -> None:
-        """Let a consumer take part; or say whom to believe of one that does.
+        """Add a consumer, or set the trusted incarnation of one that already takes part.
 
         Args:
           consumer: its name on this link.
-          incarnation: the only life of it to believe from now on; None: the newest that is heard of.
-          after: the number behind which it takes part, for those that did when an outbox was kept; None: from the next
-            token on.
+          incarnation: its only trusted incarnation from now on; None: the newest one that sends a message.
+          after: number of the last token before it takes part, for consumers from the time when an outbox was kept;
+            None: from the next token on.
         """
         peer = self._peers.get(consumer)
         if peer is None:
             if not 0 < len(consumer) <= LONGEST_NAME:
                 raise UsageError(f"a consumer's name has 1 to {LONGEST_NAME} characters, got {len(consumer)}")
             last = self._next - 1
+            # A position before the first kept token cannot be served any more: begin with what is there.
             done = last if after is None else min(max(after, last - len(self._kept)), last)
             peer = self._peers[consumer] = Peer(consumer, done, self._probe_s)
-            self._admitted = True  # once all are, what an outbox kept may turn out to be wanted by none
+            self._admitted = True  # after all are admitted, tokens from an outbox may turn out to have no consumer
         if incarnation is not None:
             peer.believe(incarnation)
 
@@ -274,13 +278,13 @@ class ExactProducer:
         peer = self._peers.pop(consumer, None)
         if peer is not None:
             self.counts.given_up += self._next - 1 - peer.done
-            self._free()
+            self._free()  # it may have been the slowest, on which the others' window depended
 
     def close(self, *, over: bool = False) -> list[Outgoing]:
-        """End this life of it: what is not done is given up.
+        """End this incarnation: unacknowledged tokens are dropped and counted.
 
         Args:
-          over: there will be no other, so consumers are told to wait no longer.
+          over: this is the last incarnation, so consumers are told to stop waiting.
         """
         if self._closed:
             return []
@@ -292,7 +296,7 @@ class ExactProducer:
     # --- what arrives
 
     def receive(self, header: Buffer, payload: Buffer = b"") -> None:
-        """Take a datagram of a consumer; `flush` gives what follows from it."""
+        """Process a datagram from a consumer; then `flush` returns the consequences."""
         del payload  # statuses have none
         try:
             status = read_from_consumer(header)
@@ -315,30 +319,37 @@ class ExactProducer:
             self.counts.restarts += peer.incarnation > 0
             peer.begin(status.incarnation)
             peer.ask_soon()
-        if status.epoch > self.epoch:  # a fact for whoever supervises this producer, who may know that it is forged
+        if status.epoch > self.epoch:  # only recorded: the supervisor of this producer may know that it is forged
             self.counts.fenced += 1
             self.newer_epoch = max(self.newer_epoch, status.epoch)
         elif (status.epoch, status.stream) == (self.epoch, self._stream):
             self._acknowledge(peer, status)
         elif status.epoch == self.epoch and status.stream > self._stream and self._inherits:
+            # The source of the numbers has returned with a higher stream, and the consumer already got it by another
+            # relay. It will never acknowledge this stream; waiting for it would block the output forever.
             self.counts.superseded += self._next - 1 - peer.done
             peer.give_up(self._next - 1)
             self._free()
         elif status.epoch == self.epoch and status.stream > self._stream:
             self.counts.refused += 1
         elif peer.in_step:
+            # Overtaken by newer statuses. A probe would be answered with what is already known.
             self.counts.late += 1
         else:
             peer.owe()
 
     def _acknowledge(self, peer: Peer, status: Status) -> None:
         """A word on this very stream: what it has, what is done, what it lacks."""
+        # Only a relay may see acknowledgements ahead of itself: when it starts over, it repeats numbers that its
+        # consumers already have. For any other producer they are forged or corrupt, and believing them would lose
+        # tokens.
         impossible = status.accepted >= self._next and not self._inherits
         if impossible or not status.done <= status.accepted <= status.limit:
             self.counts.refused += 1
             return
         if not peer.in_step:
-            if status.accepted < peer.done:  # its ledger is behind its own word: it is told from where it can go on
+            # its ledger is behind its own acknowledgement: probe it again with the position where it can continue
+            if status.accepted < peer.done:
                 peer.owe()
                 return
             peer.step_in(status.accepted)
@@ -347,6 +358,7 @@ class ExactProducer:
 
     def _free(self) -> None:
         """Forget what is done by all, and see how far the output is free."""
+        # The slowest consumer decides: a token may be forgotten only when no consumer can ask for it again (L2).
         last = self._next - 1
         peers = self._peers.values()
         done = released = min([peer.done for peer in peers], default=last)
@@ -359,6 +371,7 @@ class ExactProducer:
         else:
             for _ in range(done - first + 1):
                 self._kept.popleft()
+        assert len(self._kept) == max(0, last - done), "it keeps other tokens than the unacknowledged ones"
         self._put = max(self._put, min(done, last))
         self._open_up()
 
@@ -370,9 +383,9 @@ class ExactProducer:
     # --- what leaves
 
     def flush(self, now: float) -> list[Outgoing]:
-        """Give what is to be sent now: new tokens, what consumers lack, and probes that are due.
+        """Return the datagrams to send now: new tokens, tokens that consumers lack, and probes that are due.
 
-        To be called when something was sent or has arrived, at the end of a burst of either, and at `due`.
+        Call it after tokens were sent or datagrams arrived, at the end of each burst, and at `due`.
         """
         if self._closed or self._stream == 0:
             return []
@@ -382,14 +395,18 @@ class ExactProducer:
         out: list[Outgoing] = []
         ready = [peer for peer in self._peers.values() if peer.in_step]
         for peer in ready:
+            # `sent` falls back to `accepted` only if a status proves a loss (`Peer.learn`), so nothing is resent on
+            # suspicion: with large values a resend on a timeout would fill the network that was only slow.
             last = min(self._put, peer.limit)
             if peer.sent < last:
                 self.counts.resent += last - peer.sent
                 self._transmit(out, peer.name, peer.sent + 1, last, [peer], now)
         last = self._next - 1
+        # New tokens go out once, to all consumers together, up to the smallest limit. A consumer without room holds up
+        # the others; sending to each by itself would cost one datagram per consumer for every token.
         if ready and self._put < last:
             has = min([peer.sent for peer in ready])
-            if has >= self._put:  # else somebody has no room for what others have got
+            if has >= self._put:  # otherwise a consumer has no room for tokens that others already got
                 last = min(last, min([peer.limit for peer in ready]))
                 first = max(self._put, min(has, last)) + 1
                 self._put = first - 1

@@ -1,9 +1,9 @@
-"""The ends of links at work: over a session of a transport, on the event loop that is running.
+"""The ends of links in operation: over a session of a transport, on the running event loop.
 
-What is sent in one turn of the loop leaves in one datagram at its end, and so do the words on what is done. What is
-sent while nothing is under way, and a quarter of a window, leaves at once, for there is work for the other end. Nothing
-here decides: that is done by the machines beside this module, asked after each burst, at the end of each turn in which
-something was sent or done, and at the time when one has something to say by itself.
+Tokens sent in one iteration of the loop leave in one datagram at its end, and so do acknowledgements. If nothing is in
+transit, or a quarter of a window is waiting, tokens leave at once because the other end has work to do. No decisions
+are made here: that is up to the state machines in this package. They are asked after each burst, at the end of each
+iteration in which tokens were sent or processed, and when their own timers are due.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ __all__ = ["BoundedReceiver", "BoundedSender", "LinkReceiver", "LinkSender"]
 _LOGGER = Log("hfg.links")
 _HEADROOM = 8192  # bytes of a datagram that are kept for the header
 _TIMER_SLACK_S = 0.01
-_FEWEST = 4  # tokens, or words on tokens, for which a datagram is worth while that could be joined by more
+_FEWEST = 4  # tokens, or acknowledgements, for which a datagram is worth while although more could join it
 
 
 def _portion(window: int) -> int:
-    """Give how many leave at once, though the turn goes on: so that both ends work at the same time, not in turn."""
+    """Return how many tokens leave before the iteration ends, so that both ends work concurrently, not in turn."""
     return max(window // 4, min(window, _FEWEST))
 
 
@@ -76,7 +76,7 @@ class _Batch:
 
 
 class _Turns:
-    """Those who wait at an end of a link, in the order in which they came; each wakes the next."""
+    """Coroutines that wait at an end of a link, in the order of arrival; each wakes the next."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.waiting: deque[asyncio.Future[None]] = deque()
@@ -95,11 +95,11 @@ class _Turns:
             if turn in self.waiting:
                 self.waiting.remove(turn)
             else:
-                self.wake()  # it was its turn: somebody else's now
+                self.wake()  # it had its turn; now the next one has it
             raise
 
     def wake(self) -> None:
-        """It is the next one's turn."""
+        """Wake the next waiting coroutine."""
         while self.waiting:
             turn = self.waiting.popleft()
             if not turn.done():
@@ -113,17 +113,17 @@ class _Turns:
 
 
 class LinkSender:
-    """The sending end of an exact link at work.
+    """The sending end of an exact link in operation.
 
     Args:
-      session: of the transport, or what else carries datagrams, on the running loop.
-      name: of the link, as a key; both ends use the same.
-      epoch: which life of the producer this is.
+      session: session of a transport, or another carrier of datagrams, on the running loop.
+      name: name of the link, as a key; the same at both ends.
+      epoch: number of this incarnation of the producer.
       released: called when more tokens are released than before.
-      **options: of `ExactProducer`.
+      **options: options of `ExactProducer`.
 
     Attributes:
-      machine: what decides; to be asked, not to be told.
+      machine: the state machine; only for reading.
     """
 
     def __init__(
@@ -175,7 +175,7 @@ class LinkSender:
         self._batch.ask()
 
     async def send(self, token: EncodedToken, position: Position | None = None) -> int:
-        """The same, but wait while the window is full."""
+        """Do the same, but wait while the window is full."""
         if self._turns.waiting or not (self.machine.free if position is None else self.machine.takes(position)):
             await self._wait(position)
         number = self.send_nowait(token, position)
@@ -223,15 +223,15 @@ class LinkSender:
         self._after()
 
     def statistics(self) -> dict[str, int]:
-        """What was sent, resent, acknowledged, refused and lost, in numbers."""
+        """Return the numbers of tokens sent, resent, acknowledged, refused and lost."""
         counts: dict[str, int] = msgspec.structs.asdict(self.machine.counts)
         return counts | {"unfinished": self.machine.unfinished, "released": self.machine.released}
 
     async def close(self, *, over: bool = False) -> None:
-        """End this life of it; what was not done is given up and counted.
+        """End this incarnation of the link. Unacknowledged tokens are dropped and counted.
 
         Args:
-          over: there will be no other, so consumers are told to wait no longer.
+          over: this is the last incarnation, so consumers are told to stop waiting.
         """
         if self._closed:
             return
@@ -246,7 +246,7 @@ class LinkSender:
         self._after()
 
     def _after(self) -> None:
-        """Something was learnt: send what follows from it, and let those go on that have waited for it."""
+        """After news: send the consequences, and wake coroutines that waited for them."""
         if self._away:
             self._say_who_is_away()
         self._flush()
@@ -316,7 +316,7 @@ class LinkSender:
 
 
 class _Receiver:
-    """What both receiving ends have in common: waiting for tokens."""
+    """Common part of both receiving ends: waiting for tokens."""
 
     machine: ExactConsumer | BoundedConsumer
 
@@ -330,11 +330,11 @@ class _Receiver:
         self._closed = False
 
     def take_nowait(self) -> Delivery | None:
-        """Give the next token if there is one."""
+        """Return the next token if there is one."""
         return self.machine.take()
 
     async def take(self) -> Delivery:
-        """Give the next token, waiting for it.
+        """Wait for the next token and return it.
 
         Raises:
           TransportError: the link is closed, from this end or the other, and no token is left.
@@ -353,7 +353,7 @@ class _Receiver:
                 return token
 
     async def __aiter__(self) -> AsyncIterator[Delivery]:
-        """Give all tokens, until the link is closed."""
+        """Yield all tokens, until the link is closed."""
         while True:
             try:
                 token = await self.take()
@@ -362,12 +362,12 @@ class _Receiver:
             yield token
 
     def statistics(self) -> dict[str, int]:
-        """What was received, refused, repeated, missing and dropped, in numbers."""
+        """Return the numbers of tokens received, refused, repeated, missing and dropped."""
         counts: dict[str, int] = msgspec.structs.asdict(self.machine.counts)
         return counts | {"waiting": self.machine.waiting}
 
     async def close(self) -> None:
-        """End it; what was not done will be delivered to whoever comes next."""
+        """Close it; tokens that were not acknowledged will be delivered to the next consumer."""
         if not self._closed:
             self._closed = True
             for one in self._subscriptions:
@@ -388,18 +388,18 @@ class _Receiver:
 
 
 class LinkReceiver(_Receiver):
-    """The receiving end of an exact link at work.
+    """The receiving end of an exact link in operation.
 
     Args:
-      session: of the transport, or what else carries datagrams, on the running loop.
-      name: of the link, as a key; both ends use the same.
-      consumer: by which name the producer has admitted this end.
-      incarnation: which life of the consumer this is.
-      arrived: called when tokens have come; what is taken and done in it is told at once.
-      **options: of `ExactConsumer`.
+      session: session of a transport, or another carrier of datagrams, on the running loop.
+      name: name of the link, as a key; the same at both ends.
+      consumer: the name under which the producer has admitted this end.
+      incarnation: number of this incarnation of the consumer.
+      arrived: called when tokens have arrived; tokens that it takes and acknowledges are reported at once.
+      **options: options of `ExactConsumer`.
 
     Attributes:
-      machine: what decides; to be asked, not to be told.
+      machine: the state machine; only for reading.
     """
 
     machine: ExactConsumer
@@ -420,7 +420,7 @@ class LinkReceiver(_Receiver):
         self._subscriptions.append(session.subscribe(_to_one(name, consumer), self._receive))
         self._back = session.publisher(_back(name), Traffic.ACKNOWLEDGEMENTS)
         self._batch = _Batch(self._loop, self._flush)
-        self._batch.ask()  # to say that it is here
+        self._batch.ask()  # to announce that it is here
 
     def done(self, count: int = 1) -> None:
         """Say that the oldest tokens that were taken are processed; see `IncomingLink`."""
@@ -432,7 +432,7 @@ class LinkReceiver(_Receiver):
             self._batch.ask()
 
     async def close(self) -> None:
-        """End it; what was not done will be delivered to whoever comes next."""
+        """Close it; tokens that were not acknowledged will be delivered to the next consumer."""
         if not self._closed:
             self._flush()
             await super().close()
@@ -452,12 +452,12 @@ class LinkReceiver(_Receiver):
 
 
 class BoundedSender:
-    """The sending end of a link that may lose tokens, at work; it never waits.
+    """The sending end of a link that may lose tokens, in operation; it never waits.
 
     Args:
-      session: of the transport, or what else carries datagrams, on the running loop.
-      name: of the link, as a key; both ends use the same.
-      epoch: which life of the producer this is.
+      session: session of a transport, or another carrier of datagrams, on the running loop.
+      name: name of the link, as a key; the same at both ends.
+      epoch: number of this incarnation of the producer.
     """
 
     def __init__(self, session: Datagrams, name: str, *, epoch: int) -> None:
@@ -469,7 +469,7 @@ class BoundedSender:
         self._closed = False
 
     def send_nowait(self, token: EncodedToken) -> int:
-        """Take the next token and give its number."""
+        """Accept the next token. Return its number."""
         if self._closed:
             raise TransportError(f'link "{self.name}" is closed')
         number = self.machine.send(token)
@@ -478,7 +478,7 @@ class BoundedSender:
         return number
 
     def statistics(self) -> dict[str, int]:
-        """What was sent, in numbers."""
+        """Return the numbers of tokens and datagrams sent."""
         counts: dict[str, int] = msgspec.structs.asdict(self.machine.counts)
         return counts
 
@@ -496,13 +496,13 @@ class BoundedSender:
 
 
 class BoundedReceiver(_Receiver):
-    """The receiving end of a link that may lose tokens, at work.
+    """The receiving end of a link that may lose tokens, in operation.
 
     Args:
-      session: of the transport, or what else carries datagrams, on the running loop.
-      name: of the link, as a key; both ends use the same.
-      arrived: called when tokens have come.
-      **options: of `BoundedConsumer`.
+      session: session of a transport, or another carrier of datagrams, on the running loop.
+      name: name of the link, as a key; the same at both ends.
+      arrived: called when tokens have arrived.
+      **options: options of `BoundedConsumer`.
     """
 
     machine: BoundedConsumer

@@ -395,7 +395,7 @@ def test_two_publishers_of_one_name_are_told_and_the_second_stands_by(
     play(scene)
     told = [message for message in caplog.messages if "is published twice" in message]
     assert len(told) == 3  # both publishers and the subscriber, each once
-    assert all("give one of them another name or end it" in message for message in told)
+    assert all("rename or stop one of them" in message for message in told)
 
 
 def test_who_wants_every_value_is_refused_by_who_waits_for_nobody(
@@ -537,7 +537,9 @@ def test_targets_of_several_types_are_named() -> None:
 def test_what_is_no_name_is_refused_when_it_is_said(name: str) -> None:
     graph = hfg.Graph()
     source = graph.add(numbers())
-    with pytest.raises(hfg.errors.UsageError, match='is no name to meet by: write words with "/" between them'):
+    with pytest.raises(
+        hfg.errors.UsageError, match='is not a valid name for publishing: write words with "/" between them'
+    ):
         hfg.publish(name, source.out)
     assert list(graph.nodes) == ["numbers"]
 

@@ -191,9 +191,9 @@ def test_an_outbox_of_another_name_or_type_that_keeps_something_is_refused(file:
         OutboxFile(file, "camera/front", "int")
     first.keep(KeptValue(1, b"", b"1"), 0, {"a"})
     first.close()
-    with pytest.raises(RunError, match=r'keeps 1 values of "camera/front", and "camera/back" cannot be published'):
+    with pytest.raises(RunError, match=r'has 1 values of "camera/front", so "camera/back" cannot be published'):
         OutboxFile(file, "camera/back", "int")
-    with pytest.raises(RunError, match=r"keeps 1 values of another type"):
+    with pytest.raises(RunError, match=r"has 1 values of another type"):
         OutboxFile(file, "camera/front", "str")
     again = OutboxFile(file, "camera/front", "int")
     assert (again.stream, again.last, again.kept) == (first.stream, 1, [KeptValue(1, b"", b"1")])
@@ -222,7 +222,7 @@ def test_a_value_is_in_the_file_or_the_whole_change_is_not(file: str) -> None:
     ("how", "sentence"),
     [
         ({"lossless": False}, "which waits for nobody, and with an outbox, from which nothing is to get lost"),
-        ({"outbox": "/no/such/folder/box"}, "cannot be used: unable to open database file; give a path"),
+        ({"outbox": "/no/such/folder/box"}, "cannot be used: unable to open database file; use a writable path"),
     ],
 )
 def test_an_outbox_that_cannot_be_is_one_sentence(

@@ -1,9 +1,10 @@
-"""Programs that meet by a name: the publishing and the subscribing end, over a session of a transport (rules L1 to L4).
+"""Programs that connect by a name: the publishing and the subscribing end (rules L1 to L4).
 
-Each publisher has two links of his own, an exact one for consumers that want every value and a bounded one for all
-others; a consumer announces that it takes part, and is admitted. Who announces what, and who fits whom, is in
-`hfg.links.offers`; here is what follows from it. Programs come in any order, die and return: a watch over the name
-tells, within the lease of the transport. Stands on `hfg.links.running` and `offers`.
+They use a session of a transport. Each publisher has two links of its own, an exact one for consumers that want every
+value and a bounded one for all others. A consumer announces that it wants to take part, and is admitted.
+`hfg.links.offers` defines the announcements and the matching; this package acts on them. Programs start in any order,
+die and return: a watch over the name reports this within the lease of the transport. Depends on `hfg.links.running` and
+`offers`.
 """
 
 from hfg.links.meeting.outbox import OutboxFile

@@ -1,6 +1,6 @@
-"""What the publishing and the subscribing end have in common: who they are, and what they say about others.
+"""The common part of the publishing and the subscribing end: their identity, and their reports about others.
 
-Stands on `offers`.
+Depends on `offers`.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ MOST: Final = 1_000
 
 
 class _News:
-    """Something has changed: whoever waits looks again."""
+    """An event for changes: waiting code checks again."""
 
     def __init__(self) -> None:
         self._event = asyncio.Event()
 
     def tell(self) -> None:
-        """It has."""
+        """Report a change."""
         self._event.set()
 
     async def wait(self) -> None:
@@ -37,16 +37,16 @@ class _News:
 
 
 class End:
-    """One of two ends that meet by a name.
+    """One of two ends that connect by a name.
 
     Args:
       session: of the transport, on the running loop.
-      name: by which the programs meet.
+      name: the common name of the programs.
       hint: the declared type of the values.
-      who: for people, whose end this is.
-      lossless: whether it takes part in what gets every value.
-      stream: what all lives of this publisher publish, if he has an outbox.
-      complain: told each sentence about somebody who does not fit, once.
+      who: the owner of this end, for messages.
+      lossless: whether it takes part in the link that delivers every value.
+      stream: identity of the stream of all incarnations of this publisher, if it has an outbox.
+      complain: called with each message about an end that does not match, once.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class End:
         self._news = _News()
 
     def _seen(self, presences: list[Presence]) -> Iterator[tuple[Seen, Presence]]:
-        """Give what was heard, but for what is not said by ends like these."""
+        """Yield the announcements, except those that do not come from such ends."""
         for one in presences:
             seen = read_name(self.name, one.name)
             if seen is not None:

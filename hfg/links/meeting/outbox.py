@@ -1,7 +1,7 @@
-"""What is published and not done, in a file: whoever publishes by that file next goes on with it (rule L2).
+"""A file of published values that are not acknowledged: the next publisher with this file resumes with them (rule L2).
 
-A value is in the file before it leaves, and is taken out behind those that are known to be done, with the next one. A
-file is SQLite's, and open to one publisher at a time.
+A value is in the file before it is sent. Acknowledged values are removed when the next one is written. The file is a
+SQLite database, and open to one publisher at a time.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ class OutboxFile:
     """Keeps the values of one publisher.
 
     Args:
-      path: of the file; it is made if there is none.
-      name: by which the programs meet.
-      fingerprint: of the type of the values.
+      path: path of the file; it is created if it does not exist.
+      name: the common name of the programs.
+      fingerprint: fingerprint of the type of the values.
 
     Attributes:
       path: see above.
-      stream: an identity of what is published by this file, by all lives of the publisher together.
-      last: the number of the last value that was ever kept; 0 if there was none.
-      kept: what was in the file when it was opened, in order.
-      members: who was there for every value then.
+      stream: identity of the stream published with this file, by all incarnations of the publisher together.
+      last: number of the last value that was ever stored; 0 if there was none.
+      kept: values in the file when it was opened, in order.
+      members: consumers that wanted every value at that time.
 
     Raises:
-      RunError: it is no outbox, keeps values of another name or type, or another publisher has it open.
+      RunError: it is not an outbox, has values of another name or type, or is open in another publisher.
     """
 
     def __init__(self, path: str, name: str, fingerprint: str) -> None:
@@ -75,7 +75,7 @@ class OutboxFile:
             raise self._refuse(error) from error
 
     def _begin(self, fingerprint: str) -> tuple[str, int]:
-        """Give the stream that is carried on, and its last number; a new one if nothing of an old one is left."""
+        """Return the stream to continue, and its last number; a new stream if no value of the old one is left."""
         found = self._file.execute("SELECT name, type, stream, last FROM hfg_outbox").fetchone()
         count = self._file.execute("SELECT count(*) FROM hfg_outbox_value").fetchone()[0]
         if found is not None and found[:2] == (self._name, fingerprint):
@@ -84,8 +84,8 @@ class OutboxFile:
             self._file.close()
             what = f'of "{found[0]}"' if found[0] != self._name else "of another type"
             raise RunError(
-                f'outbox "{self.path}" keeps {count} values {what}, and "{self._name}" cannot be published by it: let '
-                "that publisher finish, or give another file"
+                f'outbox "{self.path}" has {count} values {what}, so "{self._name}" cannot be published with '
+                "it: let that publisher finish, or use another file"
             )
         stream = secrets.token_hex(8)
         self._file.execute("DELETE FROM hfg_outbox")
@@ -120,7 +120,7 @@ class OutboxFile:
         self._change(("DELETE FROM hfg_outbox_value WHERE number <= ?", (done,)))
 
     def clear(self) -> None:
-        """All is done and ended: the next publisher by this file begins a stream of its own.
+        """Forget the stream after all values are acknowledged: the next publisher with this file starts a new stream.
 
         Raises:
           RunError: the file cannot be written.
@@ -133,7 +133,10 @@ class OutboxFile:
             self._file.close()
 
     def _change(self, *statements: tuple[str, Sequence[object]]) -> None:
-        """All or nothing; somebody who was cancelled may begin another while a thread still makes this one."""
+        """Run a transaction.
+
+        If its caller is cancelled, another one may start while a thread still finishes this one.
+        """
         with self._lock:
             try:
                 self._file.execute("BEGIN")
@@ -147,6 +150,6 @@ class OutboxFile:
 
     def _refuse(self, error: sqlite3.Error) -> RunError:
         return RunError(
-            f'outbox "{self.path}" of "{self._name}" cannot be used: {error}; give a path that can be written, of a '
-            "file that is an outbox or not there, and that no other publisher has open"
+            f'outbox "{self.path}" of "{self._name}" cannot be used: {error}; use a writable path of an '
+            "outbox, or of a file that does not exist, that no other publisher has open"
         )

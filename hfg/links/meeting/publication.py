@@ -1,6 +1,6 @@
-"""The publishing end of programs that meet by a name.
+"""The publishing end of programs that connect by a name.
 
-Stands on `end`, `outbox`, `returning` and `hfg.links.running`.
+Depends on `end`, `outbox`, `returning` and `hfg.links.running`.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ Absent: TypeAlias = Literal["pass", "wait"]
 
 
 class PublicationCounts(msgspec.Struct):
-    """What has happened at a publisher.
+    """Counts of a publisher.
 
     Attributes:
-      sent: values that somebody was there for.
-      passed: values that nobody was there for.
-      restored: values of a former life that were not done, and are sent again.
-      joined: consumers that have come.
-      left: those that have gone, whatever the reason.
-      refused: those that do not fit.
-      lost: values that were on their way to consumers that have gone.
+      sent: values with a subscriber.
+      passed: values without a subscriber.
+      restored: values of a previous incarnation that were not acknowledged, and are sent again.
+      joined: consumers that have joined.
+      left: consumers that have gone, for whatever reason.
+      refused: consumers that do not match.
+      lost: values in transit to consumers that have gone.
     """
 
     sent: int = 0
@@ -54,19 +54,19 @@ class Publication(End):
 
     Args:
       session: of the transport, on the running loop.
-      name: by which the programs meet.
+      name: the common name of the programs.
       hint: the declared type of the values.
-      who: for people, whose end this is.
-      lossless: whether those who want every value are waited for; else nobody is.
-      window: how many values may be on their way to them.
-      absent: "pass": values go by while nobody is there; "wait": they wait until somebody comes, who also gets what the
-        last one that has gone had not done.
-      outbox: keeps what is not done for the next life of this publisher, which waits for those who want every value;
-        it is closed with this.
-      complain: told each sentence about somebody who does not fit, once.
+      who: the owner of this end, for messages.
+      lossless: wait for consumers that want every value; otherwise, for none.
+      window: how many values may be in transit to them.
+      absent: "pass": values are discarded while there is no consumer; "wait": they wait until a consumer joins, which
+        also gets the unacknowledged values of the last one that left.
+      outbox: stores unacknowledged values for the next incarnation of this publisher, which waits for consumers that
+        want every value; it is closed together with this end.
+      complain: called with each message about an end that does not match, once.
 
     Attributes:
-      counts: what has happened.
+      counts: see `PublicationCounts`.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class Publication(End):
         self._latest: Token[Any] | None = None
         self._over = False
         self._members: set[str] = set()  # who gets every value
-        self._left: list[str] = []  # who did, and whose place waits for an heir
+        self._left: list[str] = []  # consumers that left, whose place waits for a successor
         self._listeners: set[str] = set()  # who gets what arrives
         self._returning: Returning | None = None  # who did in a former life
         key = key_of(name, self._id)
@@ -120,15 +120,15 @@ class Publication(End):
         return link
 
     def _restored(self, outbox: OutboxFile) -> list[KeptValue]:
-        """Give what is to be sent again; an end was the end of that life."""
+        """Return the values to send again. An END was the end of that incarnation."""
         found = []
         for one in outbox.kept:
             try:
                 token = self._codec.decode(one.metadata, one.value)
             except EncodingError as error:
                 raise RunError(
-                    f'outbox "{outbox.path}" of "{self.name}" is broken: {error}; restore it from a copy, or remove it '
-                    "to begin anew"
+                    f'outbox "{outbox.path}" of "{self.name}" is broken: {error}; restore it from a copy, or '
+                    "remove it to start over"
                 ) from error
             if token.value is not END:
                 found.append(one)
@@ -136,7 +136,7 @@ class Publication(End):
 
     @property
     def attended(self) -> bool:
-        """Whether somebody takes part."""
+        """Whether there is a consumer."""
         return bool(self._members or self._listeners)
 
     async def send(self, value: object, stamp: float) -> None:
@@ -166,7 +166,10 @@ class Publication(End):
         self.counts.sent += 1
 
     async def _send_kept(self, outbox: OutboxFile, token: Token[Any]) -> EncodedToken:
-        """Send a value that is on the disk by then; by its number, that on the link, consumers know what they had."""
+        """Send a value that is on disk by then.
+
+        Its number is also its number on the link, so that consumers recognise repetitions.
+        """
         await self._exact.wait_free()
         self._number = self._exact.machine.position.sequence + 1
         encoded = self._codec.encode(replace(token, sequence=self._number))
@@ -196,7 +199,8 @@ class Publication(End):
         if self._closed:
             return
         self._closed = True
-        for one in reversed(self._open):  # the offer before the end, which says why it is gone
+        # withdraw the offer before the end announcement, which explains why the offer is gone
+        for one in reversed(self._open):
             one.close()
         await self._bounded.close()
         done = self._exact.released
@@ -213,7 +217,7 @@ class Publication(End):
                 self._outbox.close()
 
     def statistics(self) -> dict[str, int]:
-        """What has happened, in numbers."""
+        """Return the counts."""
         here = {"here": len(self._members) + len(self._listeners)}
         return msgspec.structs.asdict(self.counts) | here | {"resent": self._exact.machine.counts.resent}
 
@@ -228,7 +232,10 @@ class Publication(End):
         return msgspec.msgpack.encode(self._codec.encode(self._latest))
 
     async def _hear_finished(self, consumer: bytes) -> bytes:
-        """Somebody has done the end itself, and goes: his last word on the link may get lost, this one does not."""
+        """Answer a consumer that has processed the END and leaves.
+
+        Its last status on the link may get lost; this answer does not.
+        """
         name = consumer.decode(errors="replace")
         if self._over and name in self._members:
             self._members.remove(name)
@@ -252,10 +259,10 @@ class Publication(End):
 
     def _another(self, one: Presence) -> None:
         other = read_introduction(one.metadata)
-        whose = "something that says nothing of itself" if other is None else other.who
+        whose = "a program that does not identify itself" if other is None else other.who
         self._tell_once(
-            f'"{self.name}" is published twice: here and by {whose}; each subscriber takes the first that it finds, so '
-            "give one of them another name or end it"
+            f'"{self.name}" is published twice: here and by {whose}; each subscriber takes the first '
+            "publisher that it finds, so rename or stop one of them"
         )
 
     def _join(self, consumer: str, metadata: bytes) -> None:

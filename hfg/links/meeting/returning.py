@@ -1,4 +1,4 @@
-"""The place of those who took part in a former life of a publisher, until they are back. Stands on `running`."""
+"""Keeps the places of consumers of a previous incarnation of a publisher until they are back. Depends on `running`."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ def identity_of(consumer: str) -> str:
 
 
 class Returning:
-    """Keeps all that is sent for those who may come back; each of them gets all of it, and takes what is new.
+    """Keeps all sent values for consumers that may come back; each of them gets all values, and takes the new ones.
 
     Args:
-      link: of those who get every value.
-      expected: who they are.
+      link: the link for consumers that want every value.
+      expected: their identities.
 
     Attributes:
-      expected: see above; who is not back yet.
-      open: whether somebody is still waited for.
+      expected: see above; those that are not back yet.
+      open: whether any of them is still awaited.
     """
 
     def __init__(self, link: LinkSender, expected: Set[str]) -> None:
@@ -39,7 +39,7 @@ class Returning:
         link.admit(_PLACE, 1, after=0)
 
     def back(self, consumer: str) -> None:
-        """Somebody takes part: one of them, or an heir; from now on the others have little time left."""
+        """Record that a consumer joined: one of them, or a successor. From now on the others have little time left."""
         self.expected.discard(identity_of(consumer))
         if not self.expected:
             self.close()
@@ -47,7 +47,7 @@ class Returning:
             self._timer = asyncio.get_running_loop().call_later(_IN_S, self.close)
 
     def close(self) -> None:
-        """Wait for nobody any more. Does nothing the second time."""
+        """Stop waiting. A second call does nothing."""
         if self._timer is not None:
             self._timer.cancel()
         if self.open:

@@ -1,6 +1,6 @@
-"""The subscribing end of programs that meet by a name.
+"""The subscribing end of programs that connect by a name.
 
-Stands on `end` and `hfg.links.running`.
+Depends on `end` and `hfg.links.running`.
 """
 
 from __future__ import annotations
@@ -24,16 +24,17 @@ _ANSWER_S: Final = 2.0  # how long a publisher may take to answer
 
 
 class SubscriptionCounts(msgspec.Struct):
-    """What has happened at a subscriber.
+    """Counts of a subscriber.
 
     Attributes:
       received: values that were taken.
-      repeated: values that were taken from a former life of the publisher already, and are not given again.
+      repeated: values that were already received from a previous incarnation of the publisher, and are not returned
+        again.
       joined: publishers that were joined.
-      left: those that have gone or ended.
-      refused: publishers that do not fit, and values that are not of the type.
-      lost: values that are missing, on their way or between two publishers' lives as far as that is known.
-      dropped: values that were too many, by `overflow`.
+      left: publishers that have gone or ended.
+      refused: publishers that do not match, and values that are not of the type.
+      lost: missing values, lost in transit or between two incarnations of a publisher, as far as known.
+      dropped: values dropped by the policy `overflow`.
     """
 
     received: int = 0
@@ -48,20 +49,21 @@ class SubscriptionCounts(msgspec.Struct):
 class Subscription(End):
     """The subscribing end.
 
-    It takes part in what one publisher sends, the first that fits; when that has gone, in what the next one does.
+    It subscribes to one publisher, the first that matches; when this one has gone, to the next.
 
     Args:
       session: of the transport, on the running loop.
-      name: by which the programs meet.
+      name: the common name of the programs.
       hint: the declared type of the values.
-      who: for people, whose end this is.
-      overflow: "wait": the publisher waits for this end, and nothing is lost; else what becomes of a value too many.
-      capacity: how many values wait here.
-      latest: begin with the latest value that was published before.
-      complain: told each sentence about somebody who does not fit, once.
+      who: the owner of this end, for messages.
+      overflow: "wait": the publisher waits for this end, and nothing is lost; otherwise, what to do with a value when
+        the queue is full.
+      capacity: maximum number of waiting values.
+      latest: start with the latest value that was published before.
+      complain: called with each message about an end that does not match, once.
 
     Attributes:
-      counts: what has happened.
+      counts: see `SubscriptionCounts`.
     """
 
     def __init__(
@@ -84,9 +86,10 @@ class Subscription(End):
         self._lives = 0
         self._offers: dict[str, Introduction] = {}  # who publishes, in the order in which they were heard of
         self._ended: set[str] = set()
-        self._protests: dict[str, Closing] = {}  # what tells those who do not fit that somebody would take part
+        # announcements that tell publishers that do not match about this subscriber
+        self._protests: dict[str, Closing] = {}
         self._joined = ""
-        self._stream = ""  # of whom it takes part in, if he has an outbox
+        self._stream = ""  # of its publisher, if this has an outbox
         self._part: Closing | None = None
         self._receiver: LinkReceiver | BoundedReceiver | None = None
         self._undone = False
@@ -94,13 +97,13 @@ class Subscription(End):
         self._watch = session.watch(key_of(name), self._changed)
 
     async def take(self) -> Token[Any] | None:
-        """Give the next token, waiting for it; the one before is done.
+        """Wait for the next token and return it; the previous one is acknowledged.
 
-        END ends what one publisher sends, and None means that he has gone without an end. Behind both it goes on with
-        whoever publishes next.
+        END ends the stream of one publisher, and None means that the publisher has gone without an END. After both, it
+        continues with the next publisher.
 
         Raises:
-          QueueOverflow: a value was too many, under overflow="error".
+          QueueOverflow: the queue overflowed under overflow="error".
           TransportError: the subscription is closed.
         """
         self._done()
@@ -141,7 +144,7 @@ class Subscription(End):
         self._news.tell()
 
     def statistics(self) -> dict[str, int]:
-        """What has happened, in numbers."""
+        """Return the counts."""
         receiver = self._receiver
         waiting = 0 if receiver is None else receiver.machine.waiting
         counts = msgspec.structs.asdict(self.counts)
@@ -213,12 +216,12 @@ class Subscription(End):
         others = [self._offers[one].who for one in self._offers if one not in self._protests and one != self._joined]
         if self._joined in self._offers and others:
             self._tell_once(
-                f'"{self.name}" is published twice: by {self._offers[self._joined].who}, which is listened to, and by '
-                f"{others[0]}; give one of them another name or end it"
+                f'"{self.name}" is published twice: by {self._offers[self._joined].who}, which is subscribed '
+                f"to, and by {others[0]}; rename or stop one of them"
             )
 
     async def _join_one(self) -> Token[Any] | None:
-        """Take part in what the first publisher sends that fits; give its latest value if that is wanted."""
+        """Subscribe to the first publisher that matches. Return its latest value if that is wanted."""
         for publisher, theirs in tuple(self._offers.items()):
             if publisher in self._ended or publisher in self._protests:
                 continue
@@ -252,7 +255,7 @@ class Subscription(End):
                     overflow=self._overflow,
                     arrived=self._news.tell,
                 )
-            # Only now, for what is sent from here on has somebody who hears it.
+            # Only now, because values sent from here on have a receiver.
             self._part = self._session.announce(f"{key}/join {consumer}", self._said)
             self._look_for_others()
             self._news.tell()
@@ -264,7 +267,7 @@ class Subscription(End):
             answer = await self._session.ask(f"{key}/latest", timeout_s=_ANSWER_S)
             return self._codec.decode(*msgspec.msgpack.decode(answer, type=tuple[bytes, bytes])) if answer else None
         except (TransportError, EncodingError, msgspec.DecodeError):
-            return None  # it has gone, or has none that can be told: then from now on
+            return None  # it has gone, or has no latest value to send: then only later values count
 
     async def _say_finished(self) -> None:
         receiver = self._receiver
