@@ -187,7 +187,7 @@ class Replay:
         self.seen.append(event)
 
     def _was_torn_down(self, event: TraceEvent) -> bool:
-        """Return whether a do-activity ends because an edit takes its node away, before or behind the edit itself (R4)."""
+        """Return whether a do-activity ends because an edit removes its node, before or after the edit itself (R4)."""
         if not isinstance(event, DoEnded) or event.outcome != "cancelled" or key(event) in map(key, self.expected):
             return False
         index = self.machine.paths.get(event.node)
@@ -380,7 +380,7 @@ class Replay:
         return timeout and self.machine.times_out(self.machine.paths[move.node])
 
     def _leads_to(self, move: Move, event: TraceEvent, node: str | None) -> bool:
-        """Return whether something that is due at the node, or at the edge that the event tells of, may lie behind it."""
+        """Return whether something that is due at the event's node or edge may explain the event."""
         match move.kind:
             case "timer":
                 return (move.node or self._source_of(move.edge)) == node
@@ -408,7 +408,7 @@ class Replay:
         return False
 
     def _may_go_unseen(self, move: Move, event: TraceEvent) -> bool:
-        """Return whether it is a step of which nothing need be seen: of a task, a restart, or to a firing's turn (F14)."""
+        """Return whether the step may be invisible: of a task, of a restart, or towards a firing's turn (F14)."""
         if move.kind == "timer":
             return not (move.node and self.machine.times_out(self.machine.paths[move.node]))
         return move.kind == "task" or self._resets(move) or (move.kind == "go on" and isinstance(event, QueueGrown))

@@ -323,7 +323,7 @@ def _doubles(numbers: list[int]) -> list[int]:
 
 
 def _left(events: list[TraceEvent], edge: str) -> bool:
-    """Return whether activity on the edge was accounted for otherwise; and what lies at a disabled node may stay there."""
+    """Return whether activity on the edge was accounted for otherwise, or may stay at a disabled node."""
     lost = any(isinstance(event, ActivityLost) and event.edge == edge for event in events)
     target = edge.partition(" -> ")[2].rpartition(".")[0]
     return lost or any(

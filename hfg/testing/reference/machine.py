@@ -263,7 +263,7 @@ class ReferenceMachine(Rings):
         )
 
     def is_moving(self, index: int) -> bool:
-        """Return whether a node works, or waits for a time to come; not if its code waits until a queue has room (F8)."""
+        """Return whether a node works or waits for a point in time; not if its code waits for room in a queue (F8)."""
         station = self.stations[index]
         works = any(not work.waiting_for for work in station.work)
         return works or station.resting_until is not None or self.waits_for_rate(index)

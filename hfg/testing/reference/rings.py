@@ -59,7 +59,7 @@ class Rings(Editing):
         return [ROOT, *(-2 - box.index for box in self.structure.boxes), *range(len(self.stations))]
 
     def is_held_back(self, owner: int) -> bool:
-        """Return whether a full queue alone holds it back: code that waits for room, a slot call, or its next firing."""
+        """Return whether only a full queue holds it back: code that waits for room, a slot call, or its next firing."""
         if owner < 0:
             return self.next_call(owner) is not None
         station = self.stations[owner]

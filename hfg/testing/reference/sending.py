@@ -388,7 +388,7 @@ class Sending(State):
         return False
 
     def is_amid(self, box: int) -> bool:
-        """Return whether a node inside is amid a step of its own, so that the subgraph's activity is not looked at yet."""
+        """Return whether an inner node is within a step, so that the subgraph's activity is not checked yet."""
         return False
 
     def moot_sources(self) -> set[int]:
