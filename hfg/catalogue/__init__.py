@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     )
     from hfg.catalogue.finding import Catalogue, installed, types_of
     from hfg.catalogue.keeping import Kept, installed_index
-    from hfg.catalogue.searching import Entry, Index, categories, index_of, named, near_words, ranked, search
+    from hfg.catalogue.searching import Entry, Index, categories, index_of, named, near_words, ranked, search, unmatched
 
 __all__ = [
     "Catalogue",
@@ -54,6 +54,7 @@ __all__ = [
     "search",
     "types_of",
     "undocumented",
+    "unmatched",
 ]
 
 if not TYPE_CHECKING:
@@ -70,6 +71,16 @@ if not TYPE_CHECKING:
             ),
             "finding": ("Catalogue", "installed", "types_of"),
             "keeping": ("Kept", "installed_index"),
-            "searching": ("Entry", "Index", "categories", "index_of", "named", "near_words", "ranked", "search"),
+            "searching": (
+                "Entry",
+                "Index",
+                "categories",
+                "index_of",
+                "named",
+                "near_words",
+                "ranked",
+                "search",
+                "unmatched",
+            ),
         },
     )

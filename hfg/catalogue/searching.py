@@ -20,7 +20,7 @@ import msgspec
 if TYPE_CHECKING:  # a search of the stored index needs no description
     from hfg.catalogue.describing import TypeDescription
 
-__all__ = ["Entry", "Index", "categories", "index_of", "named", "near_words", "ranked", "search"]
+__all__ = ["Entry", "Index", "categories", "index_of", "named", "near_words", "ranked", "search", "unmatched"]
 
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_a-zA-Z]+")
 _IDLE_WORDS: Final = (
@@ -165,9 +165,7 @@ class _Found(NamedTuple):
 def ranked(index: Index, words: str) -> list[int]:
     """Return the numbers of the entries that the words describe, best first."""
     wanted = _wanted(words)
-    found = [_found(index, wanted, place) for place in range(len(wanted))]
-    for start, length, others in _meanings(wanted):
-        _add_meanings(index, found[start : start + length], others)
+    found = _all_found(index, wanted)
     whole = sum(one.weight for one in found)
     scores: dict[int, float] = {}
     for number in {number for one in found for number in one.scores}:
@@ -180,10 +178,27 @@ def ranked(index: Index, words: str) -> list[int]:
     return sorted(kept, key=lambda number: (-scores[number], number))
 
 
+def unmatched(index: Index, words: str) -> list[str]:
+    """Return the words of a search that no type has, nor one that means the same: results cover the others only."""
+    found = _all_found(index, _wanted(words))
+    return [word for word, one in zip(_telling(words), found, strict=True) if not one.scores]
+
+
+def _all_found(index: Index, wanted: Sequence[str]) -> list[_Found]:
+    found = [_found(index, wanted, place) for place in range(len(wanted))]
+    for start, length, others in _meanings(wanted):
+        _add_meanings(index, found[start : start + length], others)
+    return found
+
+
 def _wanted(words: str) -> list[str]:
     """Return the stems of the words that say something."""
+    return [_stemmed(word) for word in _telling(words)]
+
+
+def _telling(words: str) -> list[str]:
     every = _split(words)
-    return [_stemmed(word) for word in every if word not in _IDLE] or [_stemmed(word) for word in every]
+    return [word for word in every if word not in _IDLE] or every
 
 
 def _share_of_name(index: Index, number: int, wanted: Sequence[str]) -> float:

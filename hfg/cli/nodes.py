@@ -80,6 +80,9 @@ def _installed(search: str | None, category: str | None) -> int:
         found = [entries[number] for number in catalogue.ranked(kept.index, search)]
         if not found:
             return _nothing(kept.index, search)
+        if missing := catalogue.unmatched(kept.index, search):
+            named = " or ".join(f'"{word}"' for word in missing)
+            show.sentence(f"no node type matches {named}{_near(kept.index, ' '.join(missing))}; these match the other words:")
         # a category that does not exist is reported by what exists, not by what was found
         known = entries if category is None else _of_category(entries, category)
         entries = [one for one in found if one in known]
@@ -95,10 +98,14 @@ def _installed(search: str | None, category: str | None) -> int:
 
 
 def _nothing(index: Index, search: str) -> int:
-    near = catalogue.near_words(index, search)
-    hint = f"; search for {' or '.join(near)}?" if near else "; hfg nodes lists all"
+    hint = _near(index, search) or "; hfg nodes lists all"
     show.write(f'no node type matches "{search}"{hint}\n')
     return 0
+
+
+def _near(index: Index, words: str) -> str:
+    near = catalogue.near_words(index, words)
+    return f"; search for {' or '.join(near)}?" if near else ""
 
 
 # --- what is meant ---

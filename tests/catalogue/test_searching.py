@@ -23,6 +23,7 @@ from hfg.catalogue import (
     ranked,
     search,
     searching,
+    unmatched,
 )
 from hfg.catalogue.offers import Offer
 from tests.catalogue.queries import HELD_OUT, QUERIES
@@ -118,6 +119,26 @@ def test_a_phrase_means_something_else_than_its_words(library: Index) -> None:
 def test_idle_words_do_not_count_unless_there_are_no_others(library: Index) -> None:
     assert ranked(library, "how do I read a csv") == ranked(library, "read csv")
     assert ranked(library, "and")
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        ("emergency stop", {"Gate", "ActivityGate", "FlipFlop"}),
+        ("interpolate", {"map_range"}),
+        ("velocity command", {"PID"}),
+        ("integrate", {"Integral"}),
+        ("state machine", {"Sequence", "Branch", "Fallback"}),
+        ("transform pose", {"compose_rt"}),
+    ],
+)
+def test_what_robots_need_is_among_the_first_three(library: Index, words: str, meant: set[str]) -> None:
+    assert meant & {library.entries[number].title for number in ranked(library, words)[:3]}
+
+
+def test_a_word_that_no_type_has_is_named(library: Index) -> None:
+    assert unmatched(library, "inverse kinematics") == ["kinematics"]
+    assert unmatched(library, "rate limiter of a webcam") == []
 
 
 @pytest.mark.parametrize(
