@@ -9,6 +9,7 @@ from typing import Any
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.options import Clock
 from hfg.engine import PunctualLoop, Report, Run, VirtualTimeLoop, run_async
+from hfg.engine.runtime.interrupt import named
 from hfg.errors import HfgError, TargetError, UsageError
 from hfg.graph import Graph
 from hfg.parts.processes.meeting import MeetingPlace
@@ -39,6 +40,7 @@ def execute(
     """
     begun_run: Run | None = None
     interrupt.before_leaving.append(MeetingPlace.leave_all)
+    interrupt.what = named(graph)
 
     async def main() -> Report:
         task = asyncio.current_task()

@@ -25,6 +25,8 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, ClassVar, Final
 
+from hfg.base.controls import escaped
+
 __all__ = ["Interrupt"]
 
 _ALIKE = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
@@ -38,6 +40,7 @@ class Interrupt:
 
     Attributes:
       count: how often it was pressed.
+      what: the graph that runs, for messages; "" before.
       before_leaving: called before the process is left without teardown, so that files are whole.
     """
 
@@ -49,6 +52,7 @@ class Interrupt:
     def __init__(self) -> None:
         self.count = 0
         self.before_leaving: list[Callable[[], None]] = []
+        self.what = ""
         self._run: tuple[asyncio.AbstractEventLoop, asyncio.Task[Any]] | None = None
         self._noticed = threading.Event()
         self._breaking_in = False
@@ -140,6 +144,7 @@ class Interrupt:
             with suppress(ValueError, OSError):  # closed already, or the disk is full: nothing keeps us here
                 call()
         with suppress(ValueError, OSError):
-            sys.stderr.write(f"hfg: {sentence}\n")
+            what = f"{self.what}: " if self.what else ""
+            sys.stderr.write(f"hfg: {escaped(what)}{sentence}\n")
             sys.stderr.flush()
         os._exit(1)

@@ -82,7 +82,9 @@ def _installed(search: str | None, category: str | None) -> int:
             return _nothing(kept.index, search)
         if missing := catalogue.unmatched(kept.index, search):
             named = " or ".join(f'"{word}"' for word in missing)
-            show.sentence(f"no node type matches {named}{_near(kept.index, ' '.join(missing))}; these match the other words:")
+            show.sentence(
+                f"no node type matches {named}{_near(kept.index, ' '.join(missing))}; these match the other words:"
+            )
         # a category that does not exist is reported by what exists, not by what was found
         known = entries if category is None else _of_category(entries, category)
         entries = [one for one in found if one in known]

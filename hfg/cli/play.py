@@ -28,6 +28,7 @@ from hfg.cli.record import told
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
 from hfg.engine import Run
+from hfg.engine.runtime.interrupt import named
 from hfg.errors import GraphError, TargetError, UsageError
 from hfg.recording import Recording, play_into
 from hfg.recording import record as begin_recording
@@ -87,7 +88,7 @@ def play(
     if error is not None:
         show.failure(error)
     if interrupt.count:
-        show.sentence(f'graph "{graph.name}": interrupted; what came back is torn down')
+        show.sentence(f"{named(graph)}: interrupted; what came back is torn down")
     elif report is not None and error is None:
         show.report(graph.name, report, verbose)
     return 1 if error is not None or interrupt.count or playing.is_damaged else code

@@ -30,6 +30,7 @@ from hfg.cli.options import (
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
 from hfg.engine import Run
+from hfg.engine.runtime.interrupt import named
 from hfg.recording import Recording
 from hfg.recording import record as begin_recording
 
@@ -95,7 +96,7 @@ def record(
     if error is not None:
         show.failure(error)
     if interrupt.count:
-        show.sentence(f'graph "{graph.name}": interrupted; what came back is torn down')
+        show.sentence(f"{named(graph)}: interrupted; what came back is torn down")
     elif report is not None and error is None:
         show.report(graph.name, report, 0)
     return 1 if error is not None or interrupt.count else code

@@ -37,6 +37,7 @@ from hfg.cli.target import load_graph
 from hfg.engine import Run
 from hfg.engine.observing.encoding import encode
 from hfg.engine.observing.report import RunPage
+from hfg.engine.runtime.interrupt import named
 from hfg.errors import HfgError, TargetError
 from hfg.graph import Graph
 from hfg.timeline import Timeline
@@ -136,7 +137,7 @@ def _ended(graph: Graph, error: HfgError | None, interrupt: Interrupt) -> int:
     if error is not None:
         show.failure(error)
     if interrupt.count:
-        show.sentence(f'graph "{graph.name}": interrupted; what came back is torn down')
+        show.sentence(f"{named(graph)}: interrupted; what came back is torn down")
     return 1 if interrupt.count or error is not None else 0
 
 

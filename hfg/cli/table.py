@@ -72,14 +72,28 @@ class View:
         while len(glances) > 2 and glances[1][0].machine_s <= glance.machine_s - _OVER_S:
             glances.popleft()
 
+    @property
+    def has_rates(self) -> bool:
+        """Whether each node was seen at two times: the first glance lacks those of other processes."""
+        new, _ = self._glances[-1]
+        return bool(new.nodes) and all(
+            new.machine_s - node.age_s > old.machine_s - then.age_s
+            for node in new.nodes
+            for old, then in (self._first(node),)
+        )
+
+    def _first(self, node: NodeGlance) -> tuple[Glance, NodeGlance]:
+        """Return the oldest glance at a node."""
+        return next((old, before[node.path]) for old, before in self._glances if node.path in before)
+
     def rows(self) -> list[Row]:
         """The rows of all nodes, in order of adding; with one glance alone nothing has a rate yet."""
-        (old, before), (new, _) = self._glances[0], self._glances[-1]
-        seconds = new.duration_s - old.duration_s
-        machine_s = new.machine_s - old.machine_s
+        new, _ = self._glances[-1]
         rows = []
         for node in new.nodes:
-            then = before.get(node.path, node)
+            old, then = self._first(node)
+            newer_s = then.age_s - node.age_s  # counts of another process are older than the glance
+            seconds, machine_s = (new.duration_s - old.duration_s + newer_s, new.machine_s - old.machine_s + newer_s)
             done, busy_s = node.done - then.done, node.busy_s - then.busy_s
             rows.append(
                 Row(

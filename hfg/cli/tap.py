@@ -26,6 +26,7 @@ from hfg.cli.target import SUFFIXES, import_from_here, load_graph
 from hfg.engine import Run
 from hfg.engine.face.watching import Answer, Question
 from hfg.engine.observing.encoding import line_of
+from hfg.engine.runtime.interrupt import named
 from hfg.errors import GraphError, TargetError, UsageError
 
 __all__ = ["tap"]
@@ -85,7 +86,7 @@ def tap(
     if not printer.seen and report is not None:
         show.sentence(f'no token passed "{path}" in {report.duration_s:.3f} s')
     if interrupt.count:
-        show.sentence(f'graph "{graph.name}": interrupted; what came back is torn down')
+        show.sentence(f"{named(graph)}: interrupted; what came back is torn down")
     return 1 if error is not None or interrupt.count else 0
 
 

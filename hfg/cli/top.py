@@ -27,6 +27,7 @@ __all__ = ["top"]
 
 _PIPE_COLUMNS = 200
 _BETWEEN_S = 1.0  # where there is one table only, rates are those of so long
+_MOST_LOOKS = 4  # while processes of parts have not answered
 
 
 def top(
@@ -58,10 +59,10 @@ def _look(line: Line | RealmLine, json: bool) -> int:
 
 
 def _once(line: Line | RealmLine, json: bool) -> int:
-    """Look twice, so that there are rates, and write what was seen."""
+    """Look twice, so that there are rates, and write what was seen; more often while processes of parts are asked."""
     view = View()
     glances: list[Glance] = []
-    while len(glances) < 2:
+    while len(glances) < 2 or (len(glances) < _MOST_LOOKS and not view.has_rates):
         if glances:
             time.sleep(_BETWEEN_S)
         glance = _glance(line)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 from rich.cells import cell_len
 
@@ -13,9 +14,10 @@ def node(
     path: str, *, done: int = 0, busy_s: float = 0.0, queued: int = 0, failed: int = 0, **more: object
 ) -> NodeGlance:
     known: dict[str, object] = {"group": "loop", "active": False, "doing": "rate", **more}
-    return NodeGlance(
+    made = NodeGlance(
         path, str(known["group"]), done, busy_s, queued, failed, bool(known["active"]), str(known["doing"])
     )
+    return msgspec.structs.replace(made, age_s=float(str(known.get("age_s", 0.0))))
 
 
 def look(at: float, *nodes: NodeGlance, outcome: str = "running") -> Glance:
@@ -50,6 +52,17 @@ def test_rates_are_those_of_the_last_second() -> None:
     looks = [look(at, node("a", done=done)) for at, done in ((0.0, 0), (1.0, 1000), (1.5, 1005), (2.0, 1010))]
     (row,) = view(*looks).rows()
     assert row.rate_hz == pytest.approx(10.0)
+
+
+def test_a_node_of_another_process_has_the_rate_of_its_own_counts() -> None:
+    """The first glance lacks its counts, and those of later ones are as old as the last report of its process."""
+    looks = [look(0.0), look(1.0, node("a", done=50, age_s=1.0)), look(2.0, node("a", done=140, age_s=0.2))]
+    made = view(*looks[:2])
+    assert not made.has_rates
+    made.look(looks[2])
+    assert made.has_rates
+    (row,) = made.rows()
+    assert row.rate_hz == pytest.approx(50.0)  # 90 firings in 1.8 s
 
 
 def test_one_glance_has_no_rates_and_a_node_that_is_new_neither() -> None:

@@ -279,7 +279,7 @@ def _run_blocking(graph: Graph, clock: Clock, settings: Settings, begin: Callabl
     except (asyncio.CancelledError, KeyboardInterrupt, RunError):
         if not ctrl_c.count:
             raise
-    raise KeyboardInterrupt(ctrl_c.sentence(graph.name))
+    raise KeyboardInterrupt(ctrl_c.sentence(graph))
 
 
 class _Block(AbstractAsyncContextManager[Run]):

@@ -30,6 +30,7 @@ class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
       doing: "working", or what it waits for (`NodeStatistics.waiting`).
       under_way: how many of its firings are under way now.
       retries: how often a firing was tried again so far.
+      age_s: how long ago its counts were taken, on the run's clock: a node of another process is as of its last report.
     """
 
     path: str
@@ -42,6 +43,7 @@ class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
     doing: str
     under_way: int = 0
     retries: int = 0
+    age_s: float = 0.0
 
 
 class Glance(msgspec.Struct, frozen=True):

@@ -24,11 +24,20 @@ from typing import Any
 
 from hfg.engine.runtime.lifetime import Lifetime
 from hfg.errors import HfgError
+from hfg.graph import Graph
 
 __all__ = ["CtrlC"]
 
 _BREAK_IN_AFTER_S = 0.6
 _LEAVE_AFTER_S = 1.8
+
+
+def named(graph: Graph) -> str:
+    """Return the name of a graph that is interrupted, with the groups that run in processes of their own."""
+    groups = [f'"{name}"' for name, spec in graph.groups.items() if spec.process or spec.host]
+    if not groups:
+        return f'graph "{graph.name}"'
+    return f'graph "{graph.name}" with the process{"es" * (len(groups) > 1)} of {", ".join(groups)}'
 
 
 class CtrlC:
@@ -72,10 +81,10 @@ class CtrlC:
                     loop.remove_signal_handler(signal.SIGINT)
             signal.signal(signal.SIGINT, signal.default_int_handler)
 
-    def sentence(self, name: str) -> str:
+    def sentence(self, graph: Graph) -> str:
         """What the user reads at the end."""
         error = self.error()
-        return f'graph "{name}" was interrupted; ' + ("what came back is torn down" if error is None else str(error))
+        return f"{named(graph)} was interrupted; " + ("what came back is torn down" if error is None else str(error))
 
     def _pressed(self, _number: int, _frame: FrameType | None) -> None:
         if self._breaking_in:  # our own signal, from `_insist`

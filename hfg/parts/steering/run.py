@@ -375,9 +375,11 @@ class CutRun(Run):
         self._ask_counts("glance")
         mine = super().glance()
         nodes = {node.path: node for node in mine.nodes}
+        now = self.now()
         for counts in self._counts.values():
+            age_s = max(now - counts.at, 0.0)
             if counts.glance is not None:
-                nodes |= {node.path: node for node in counts.glance.nodes}
+                nodes |= {node.path: msgspec.structs.replace(node, age_s=age_s) for node in counts.glance.nodes}
         lost = mine.lost + sum(counts.glance.lost for counts in self._counts.values() if counts.glance is not None)
         return msgspec.structs.replace(mine, nodes=list(self._in_order(nodes).values()), lost=lost)
 
