@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import msgspec
 
@@ -29,22 +30,21 @@ from hfg.files.document import (
     GateDocument,
     InsideDocument,
     NodeDocument,
-    OperatorDocument,
 )
 from hfg.files.findings import Findings, Key, Lines, graph_path
 from hfg.files.missing import MissingNode, missing_node
 from hfg.files.reading import Read, read_file
 from hfg.files.values import decoded, decoded_parameter
 from hfg.graph.editing.commands import Disconnect, Move, Remove
+from hfg.graph.editing.data import edge_as_meant
 from hfg.graph.editing.performing import perform
 from hfg.graph.editing.type_texts import type_of_text
 from hfg.graph.graph import Graph, Subgraph, graph_of
 from hfg.graph.structure.connecting import declare_edge
-from hfg.graph.structure.edge import type_of
 from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.membership import set_options
 from hfg.graph.structure.naming import suggest
-from hfg.graph.structure.operators import find_operator
+from hfg.graph.structure.options import GroupGiven, NodeGiven
 from hfg.graph.structure.pointing import node_at, source_at, target_at
 from hfg.graph.structure.refusals import raise_refusals
 from hfg.nodetypes.node import Node
@@ -52,8 +52,6 @@ from hfg.nodetypes.node import Node
 __all__ = ["box_of_file", "build", "load", "modules_of"]
 
 _LOGGER: Final = Log("hfg.files")
-_OPTIONS: Final = tuple(name for name in NODE_OPTIONS if name != "iterate_over")
-_EDGE_OPTIONS: Final = ("active", "capacity", "overflow", "capacity_limit", "buffer")
 _NOBODY: Final[Any] = None
 _current: ContextVar[_Loading | None] = ContextVar("hfg.files.loading", default=None)
 
@@ -366,16 +364,7 @@ class _Making:
         """Declare the groups of a whole graph."""
         for name, group in document.groups.items():
             with self.told((*key, "groups", name), f'group "{name}"'):
-                graph.group(
-                    name,
-                    threads=group.threads,
-                    policy=group.policy,
-                    seed=group.seed,
-                    process=group.process,
-                    host=group.host,
-                    ledger=group.ledger,
-                    may_misalign=group.may_misalign,
-                )
+                graph.group(name, **cast(GroupGiven, {"threads": group.threads, **group.said()}))
 
     def note_gates(self, graph: Graph, box: BoxDocument, key: Key, lost: Set[str]) -> None:
         """Note the gates in a graph; they are made when all is there."""
@@ -426,9 +415,8 @@ class _Making:
         made = self.made(graph, box, name, said, key)
         if made is None:
             return
-        options = {option: getattr(said, option) for option in _OPTIONS}
         try:
-            graph.add(made, name=name, iterate_over=tuple(said.iterate_over), **options)
+            graph.add(made, name=name, **cast(NodeGiven, said.said()))
         except GraphError as error:
             given = (option for option in NODE_OPTIONS if (*key, option) in self.lines and option in str(error))
             self.wrong((*key, next(given, "type")), error, graph_path(key))
@@ -521,17 +509,8 @@ class _Making:
         source = _end(level, said.source, owner, ("inputs", "slots"), source_at)
         target = _end(level, said.target, owner, ("outputs", "events"), target_at)
         where = f'"{said.source}" -> "{said.target}"'
-        options: dict[str, Any] = {name: getattr(said, name) for name in _EDGE_OPTIONS}
-        options["initial"] = tuple(decoded(one, type_of(target), self.loading.find) for one in said.initial)
-        options["through"] = tuple(self.operator(one, where) for one in said.through)
+        options = edge_as_meant(said.said(), target, where, partial(decoded, find=self.loading.find))
         declare_edge(level, source, target, options)
-
-    def operator(self, said: OperatorDocument, where: str) -> object:
-        """Make an operator; what it is given may say of itself of which type it is."""
-        find = self.loading.find
-        arguments = tuple(decoded(one, Any, find) for one in said.arguments)
-        parameters = {name: decoded(one, Any, find) for name, one in said.parameters.items()}
-        return find_operator(said.type, arguments, parameters, where)
 
     def promote(self, graph: Graph, box: BoxDocument, owner: Subgraph | None, name: str, path: str, key: Key) -> None:
         if owner is None:

@@ -8,17 +8,18 @@ file describes is told by that file. Stands on `document`, `boxes` and `missing`
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+import msgspec
+
 from hfg.base.values import same
 from hfg.encoding import encode
-from hfg.errors import EncodingError, UsageError
+from hfg.errors import EncodingError, GraphError, UsageError
 from hfg.files.allowed import project_of
 from hfg.files.boxes import FileBox, conditions_in_words, limits_in_words
 from hfg.files.document import (
-    NODE_OPTIONS,
     BoxDocument,
     Document,
     EdgeDocument,
@@ -26,17 +27,17 @@ from hfg.files.document import (
     GroupDocument,
     InsideDocument,
     NodeDocument,
-    OperatorDocument,
     ParameterDocument,
 )
 from hfg.files.findings import Findings
 from hfg.files.missing import MissingNode
+from hfg.graph.editing.data import edge_as_data
 from hfg.graph.editing.type_texts import text_of_type
 from hfg.graph.graph import Graph
-from hfg.graph.structure.edge import Edge, is_feed, type_of
+from hfg.graph.structure.edge import Edge, is_feed
 from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.operators import NamedOperator
-from hfg.graph.structure.options import EdgeOptions, GroupSpec, NodeOptions
+from hfg.graph.structure.options import GroupSpec
 from hfg.graph.structure.refusals import raise_refusals
 from hfg.graph.structure.subgraph import Box, is_box, is_unnamed
 from hfg.nodetypes.node import Node
@@ -46,8 +47,6 @@ from hfg.ports.specs import REQUIRED
 
 __all__ = ["describe"]
 
-_PLAIN_EDGE: Final = EdgeOptions()
-_PLAIN_NODE: Final = NodeOptions()
 _OF_BUILT: Final = ("enabled", "group")  # what may be said about a node that a type has built
 
 
@@ -92,9 +91,7 @@ class _Telling:
         for spec in root.whole.groups.by_name.values():
             if spec != GroupSpec("loop"):
                 threads = 1 if spec.name == "loop" else spec.threads
-                document.groups[spec.name] = GroupDocument(
-                    threads, spec.policy, spec.seed, spec.process, spec.host, spec.ledger, spec.may_misalign
-                )
+                document.groups[spec.name] = GroupDocument(**{**spec.said(), "threads": threads})
         for name, port in root.ports.inputs.items():
             document.inputs[name] = self.type_text(port.type, f'input "{name}"')
         for name, out in root.ports.outputs.items():
@@ -126,19 +123,16 @@ class _Telling:
             box.promotes[name] = [_parameter_name(port) for port in ports]
 
     def node(self, node: Node) -> NodeDocument:
+        options = node._options.said()
         if isinstance(node, MissingNode):
             said = node._said
-            told = NodeDocument(said.type, parameters=said.parameters, inside=said.inside, graph=said.graph)
+            told = NodeDocument(said.type, parameters=said.parameters, inside=said.inside, graph=said.graph, **options)
         else:
-            told = NodeDocument(parameters=self.parameters(node))
+            told = NodeDocument(parameters=self.parameters(node), **options)
             if is_box(node):
                 self.box(node, told)
             else:
                 told.type = self.reference(node)
-        for option in NODE_OPTIONS:
-            value = getattr(node._options, option)
-            if value != getattr(_PLAIN_NODE, option):
-                setattr(told, option, list(value) if isinstance(value, tuple) else value)
         told.gate = self.gate(node, level_of(node.place.graph))
         told.position, told.notes = self.notes(node, {})
         return told
@@ -299,7 +293,9 @@ class _Telling:
         pairs = zip(_within(within), _within(made), strict=True)
         built = {gate.target for level in made.whole.root.walk() for gate in level.gates}
         for (path, one), (_, other) in pairs:
-            if any(getattr(one._options, name) != getattr(other._options, name) for name in _rest()):
+            if msgspec.structs.replace(other._options, **{name: getattr(one._options, name) for name in _OF_BUILT}) != (
+                one._options
+            ):
                 return None
             told = InsideDocument(parameters=self.parameters(one, other))
             if any(not one._type.parameters[name].is_port for name in told.parameters):
@@ -342,35 +338,12 @@ class _Telling:
                 "by graph.input(...)",
             )
             return None
-        told = EdgeDocument(_end(edge.source, level), _end(edge.target, level))
-        for name in ("active", "capacity", "overflow", "capacity_limit", "buffer"):
-            setattr(told, name, getattr(edge.options, name))
-        if edge.overflow == "latest":
-            told.capacity = _PLAIN_EDGE.capacity  # it is 1 by that
         try:
-            told.initial = [encode(one, type_of(edge.target)) for one in edge.options.initial]
-        except EncodingError as error:
-            self.wrong(edge.label, f"an initial value is no plain data: {error}; take another")
-        told.through = [one for operator in edge.options.through for one in self.operator(edge, operator)]
-        return told
-
-    def operator(self, edge: Edge, operator: object) -> Iterator[OperatorDocument]:
-        reference = operator.made_by.reference if isinstance(operator, NamedOperator) else None
-        if not isinstance(operator, NamedOperator) or reference is None:
-            self.wrong(
-                edge.label,
-                f"its operator {operator!r:.80} cannot be found by name; make it by a function at the top of a module "
-                "with @hfg.operator, or by one of reactivex, as in hfg.operator(ops.debounce)(0.2)",
-            )
-            return
-        try:
-            yield OperatorDocument(
-                reference,
-                [encode(one, Any) for one in operator.arguments],
-                {name: encode(one, Any) for name, one in operator.parameters.items()},
-            )
-        except EncodingError as error:
-            self.wrong(edge.label, f"its operator {operator!r:.80} is not made of plain data: {error}; give it others")
+            said = edge_as_data(edge, encode)
+        except GraphError as error:
+            self.wrong(edge.label, str(error))
+            return None
+        return EdgeDocument(_end(edge.source, level), _end(edge.target, level), **said)
 
 
 def _end(end: Any, level: Level) -> str:
@@ -386,10 +359,6 @@ def _end(end: Any, level: Level) -> str:
     if not isinstance(end.node, Node):
         return end.name
     return f"{end.node.place.name}.{end.name}"
-
-
-def _rest() -> list[str]:
-    return [name for name in NODE_OPTIONS if name not in _OF_BUILT]
 
 
 def _within(level: Level) -> list[tuple[str, Node]]:

@@ -18,7 +18,9 @@ from typing import Any, Final
 
 import msgspec
 
-from hfg.graph.structure.options import DEFAULT_CAPACITY, NodeOptions, OnError, Overflow, Policy, Release
+from hfg.graph.editing.commands import EdgeSaid, Operator
+from hfg.graph.structure.option import declared
+from hfg.graph.structure.options import GroupFields, NodeFields
 
 __all__ = [
     "NODE_OPTIONS",
@@ -39,44 +41,20 @@ VERSION: Final = 1
 SUFFIX: Final = ".hfg.yaml"
 
 
-class OperatorDocument(msgspec.Struct, omit_defaults=True):
-    """An operator on an edge (rule P9); in a file its reference alone if it is given nothing.
-
-    Attributes:
-      type: the reference of the function that makes it, "reactivex.operators:debounce".
-      arguments: what that is given by position.
-      parameters: what it is given by name.
-    """
-
-    type: str
-    arguments: list[Any] = []
-    parameters: dict[str, Any] = {}
+OperatorDocument = Operator
+"""An operator on an edge (rule P9); in a file its reference alone if it is given nothing."""
 
 
-class EdgeDocument(msgspec.Struct, omit_defaults=True):
+class EdgeDocument(EdgeSaid, omit_defaults=True):
     """An edge; in a file "camera.out -> blur.image", what else is said about it below that.
 
     Attributes:
       source: a port as seen from where the edge stands: "camera.out", "fetch/go_to.goal", or a port of its own by name.
       target: likewise.
-      active: whether it also transports activity.
-      capacity: of an event edge: how many untaken signals it holds (rule P5).
-      overflow: of an event edge: what happens to more of them.
-      capacity_limit: of an event edge: how far "wait" may let the queue grow (rule F8).
-      buffer: of an edge from an output into an input: by how many tokens the producer may run ahead (rule P4).
-      initial: values that lie on it at the start, the oldest first (rule P7).
-      through: operators on the way (rule P9).
     """
 
     source: str
     target: str
-    active: bool = False
-    capacity: int = DEFAULT_CAPACITY
-    overflow: Overflow = "wait"
-    capacity_limit: int | None = None
-    buffer: int = 0
-    initial: list[Any] = []
-    through: list[OperatorDocument] = []
 
 
 class GateDocument(msgspec.Struct, omit_defaults=True):
@@ -92,26 +70,10 @@ class GateDocument(msgspec.Struct, omit_defaults=True):
     idle_rate_hz: float | None = None
 
 
-class GroupDocument(msgspec.Struct, omit_defaults=True):
-    """Where nodes run (rules R1, R2).
-
-    Attributes:
-      threads: 1 for a thread of its own, more for as many, 0 for the event loop.
-      policy: who is first when several can run.
-      seed: for policy "random"; by default the run's.
-      process: it has a process of its own.
-      host: the agent that runs that process.
-      ledger: what that has done is kept: true by the run, a path in that file, too.
-      may_misalign: the run goes on when it dies, though joins may pair what does not belong together.
-    """
+class GroupDocument(GroupFields, omit_defaults=True, kw_only=True):
+    """Where nodes run (rules R1, R2)."""
 
     threads: int = 1
-    policy: Policy = "fifo"
-    seed: int | None = None
-    process: bool = False
-    host: str = ""
-    ledger: bool | str = False
-    may_misalign: bool = False
 
 
 class ParameterDocument(msgspec.Struct, omit_defaults=True):
@@ -191,7 +153,7 @@ class BoxDocument(msgspec.Struct, omit_defaults=True):
     promotes: dict[str, list[str]] = {}
 
 
-class NodeDocument(msgspec.Struct, omit_defaults=True):
+class NodeDocument(NodeFields, omit_defaults=True):
     """A node: what it is, how it runs, what it is given.
 
     It is one of three: of a type, of a file, or a graph alone, which is a subgraph without a type of its own. A type
@@ -200,7 +162,6 @@ class NodeDocument(msgspec.Struct, omit_defaults=True):
     Attributes:
       type: its reference, "my_robot.nodes:MapLookup".
       file: of a subgraph that another file describes, from the folder of this one.
-      group: where it runs; by default where the subgraph around it does. This and the next are those of `graph.add`.
       gate: couples its work to the activity of another.
       parameters: by name.
       inside: of a subgraph: what is otherwise with the nodes in it, by path from there.
@@ -211,30 +172,11 @@ class NodeDocument(msgspec.Struct, omit_defaults=True):
 
     type: str = ""
     file: str = ""
-    group: str | None = None
-    priority: int = 0
-    max_rate_hz: float | None = None
-    on_error: OnError = "stop"
-    restart_limit: int = 5
-    restart_backoff_s: float = 0.1
-    max_duration_s: float | None = None
-    retries: int = 0
-    retry_on: list[str] = []
-    retry_backoff_s: float = 0.1
-    retry_backoff_max_s: float = 30.0
-    retry_jitter: float = 0.0
-    concurrency: int = 1
-    ordered: bool = True
-    release: Release = "auto"
-    active_for_s: float | None = None
-    deadline_s: float | None = None
-    enabled: bool = True
-    iterate_over: list[str] = []
     gate: GateDocument | None = None
-    parameters: dict[str, Any] = {}
-    inside: dict[str, InsideDocument] = {}
+    parameters: dict[str, Any] = msgspec.field(default_factory=dict)
+    inside: dict[str, InsideDocument] = msgspec.field(default_factory=dict)
     position: list[Any] | None = None
-    notes: dict[str, Any] = {}
+    notes: dict[str, Any] = msgspec.field(default_factory=dict)
     graph: BoxDocument | None = None
 
 
@@ -254,5 +196,5 @@ class Document(BoxDocument, omit_defaults=True):
     groups: dict[str, GroupDocument] = {}
 
 
-NODE_OPTIONS: Final = NodeOptions.__struct_fields__
+NODE_OPTIONS: Final = tuple(declared(NodeFields))
 """The fields of a node that `graph.add` takes."""

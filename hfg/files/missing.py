@@ -17,13 +17,15 @@ from hfg.errors import Problem
 from hfg.files.document import EdgeDocument, NodeDocument
 from hfg.graph.checks.checking import also
 from hfg.graph.flat.flattening import FlatGraph
+from hfg.graph.structure.option import having
+from hfg.graph.structure.options import EdgeFields
 from hfg.nodetypes.description import EventSpec, InputSpec, NodeType, OutputSpec, SlotSpec
 from hfg.nodetypes.node import Node
 from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS, sent_of
 
 __all__ = ["MissingNode", "missing_node", "missing_types"]
 
-_FOR_EVENTS: Final = ("capacity", "overflow", "capacity_limit", "through")
+_FOR_EVENTS: Final = frozenset(having(EdgeFields, "events"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +97,7 @@ class _Ports:
         for edge in edges:
             node, dot, port = edge.source.partition(".")
             if node == name and dot:
-                self._sends(port, any(getattr(edge, option) != _plain(option) for option in _FOR_EVENTS))
+                self._sends(port, not _FOR_EVENTS.isdisjoint(edge.said()))
             node, dot, port = edge.target.partition(".")
             if node == name and dot and port not in AUTOMATIC_SLOTS:
                 self._takes(port)
@@ -118,10 +120,6 @@ class _Ports:
             self.slots[port] = None
         else:
             self.inputs[port] = None
-
-
-def _plain(option: str) -> Any:
-    return getattr(EdgeDocument("", ""), option)
 
 
 @also

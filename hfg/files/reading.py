@@ -127,6 +127,9 @@ class _Reading:
                 return self.mapping(found, inner, key)
             case inspect.ListType(item_type=inner):
                 return self.list(found, inner, key)
+            case inspect.VarTupleType(item_type=inner):
+                several = self.list(found, inner, key)
+                return several if several is _WRONG else tuple(several)
             case inspect.UnionType(types=types):
                 return self.one_of(found, types, key)
             case inspect.LiteralType(values=values):

@@ -14,7 +14,9 @@ import docstring_parser
 import msgspec
 
 from hfg.files import document
-from hfg.files.document import VERSION, Document, EdgeDocument, OperatorDocument
+from hfg.files.document import VERSION, Document, EdgeDocument
+from hfg.graph.editing.commands import Operator
+from hfg.graph.structure.option import Fields, declared
 
 __all__ = ["json_schema", "schema_text"]
 
@@ -35,9 +37,9 @@ def json_schema() -> dict[str, Any]:
     (top,), components = msgspec.json.schema_components([Document], ref_template="#/$defs/{name}")
     for name, component in components.items():
         _describe(getattr(document, name), component)
-    operator = components["OperatorDocument"]
-    components["OperatorDocument"] = {
-        "title": OperatorDocument.__name__,
+    operator = components["Operator"]
+    components["Operator"] = {
+        "title": Operator.__name__,
         "anyOf": [{"type": "string", "description": "its reference, where it is given nothing"}, operator],
     }
     components["EdgeDocument"] = _edge(components["EdgeDocument"])
@@ -60,6 +62,11 @@ def _describe(struct: type[Any], component: dict[str, Any]) -> None:
     for parameter in told.params:
         if parameter.arg_name in component["properties"]:
             component["properties"][parameter.arg_name]["description"] = " ".join((parameter.description or "").split())
+    for name, one in declared(struct).items() if issubclass(struct, Fields) else ():
+        option, property_ = one.option, component["properties"][name]
+        property_["description"] = option.says
+        limits = {"minimum": option.least, "maximum": option.most, "exclusiveMinimum": option.above}
+        property_ |= {word: limit for word, limit in limits.items() if limit is not None}
     for name, one in component["properties"].items():
         if one.get("type") in ("object", "array") and name not in ("position", "choices"):
             one["type"] = [one["type"], "null"]

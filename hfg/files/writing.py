@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from hfg.base.whole import write_whole
 from hfg.files.document import (
+    NODE_OPTIONS,
     VERSION,
     BoxDocument,
     Document,
@@ -57,7 +58,7 @@ def _plain(value: Any) -> Any:
             return value.type if len(found) == 1 else found
         case dict():
             return {name: _plain(one) for name, one in value.items()}
-        case list():
+        case list() | tuple():
             return [_plain(one) for one in value]
     if hasattr(value, "__struct_fields__"):
         return _struct(value) or None
@@ -68,7 +69,10 @@ def _struct(value: Any) -> dict[str, Any]:
     """The fields that are not as they are when nothing is said; those that must be said always."""
     defaults = dict(zip(reversed(value.__struct_fields__), reversed(value.__struct_defaults__), strict=False))
     found: dict[str, Any] = {}
-    for name in value.__struct_fields__:
+    names = value.__struct_fields__
+    if isinstance(value, NodeDocument):  # what it is, how it runs, what it is given
+        names = (*names[:2], *NODE_OPTIONS, *(name for name in names[2:] if name not in NODE_OPTIONS))
+    for name in names:
         one = getattr(value, name)
         usual = defaults.get(name, _Required)
         usual = usual.factory() if hasattr(usual, "factory") else usual

@@ -16,16 +16,19 @@ from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.operators import operator
-from hfg.graph.structure.options import EdgeOptions, GroupSpec, NodeOptions
+from hfg.graph.structure.options import EdgeGiven, EdgeOptions, GroupGiven, GroupSpec, NodeGiven, NodeOptions
 
 __all__ = [
     "Edge",
+    "EdgeGiven",
     "EdgeOptions",
     "Gate",
     "Graph",
     "GraphInput",
     "GraphOutput",
+    "GroupGiven",
     "GroupSpec",
+    "NodeGiven",
     "NodeOptions",
     "Subgraph",
     "commands",

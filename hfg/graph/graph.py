@@ -11,7 +11,7 @@ import copy
 import os
 from collections.abc import Callable, Iterable
 from types import ModuleType
-from typing import Any, ClassVar, Final, Literal, Never, TypeVar, overload
+from typing import Any, ClassVar, Final, Literal, Never, TypeAlias, TypeVar, Unpack, overload
 
 from reactivex import Observable
 from typing_extensions import TypeForm
@@ -33,7 +33,8 @@ from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.gating import set_gate
 from hfg.graph.structure.level import Level, Whole, inside
 from hfg.graph.structure.naming import need_name
-from hfg.graph.structure.options import DEFAULT_CAPACITY, Errors, GroupSpec, OnError, Overflow, Policy, Release
+from hfg.graph.structure.option import Fields, unknown
+from hfg.graph.structure.options import EdgeGiven, EdgeOptions, GroupGiven, GroupSpec, NodeGiven, NodeOptions
 from hfg.graph.structure.pointing import node_at
 from hfg.graph.structure.promoting import promote
 from hfg.graph.structure.subgraph import Box
@@ -44,6 +45,7 @@ __all__ = ["Enclosed", "Graph", "Subgraph", "graph_of"]
 
 N = TypeVar("N", bound=Node)
 T = TypeVar("T")
+Through: TypeAlias = Callable[[Observable[Any]], Observable[Any]]
 
 _NOBODY: Final[Any] = None  # so that a forgotten `by=` is answered by a sentence
 
@@ -137,218 +139,66 @@ class Graph:
 
     # --- nodes and edges ---
 
-    def add(
-        self,
-        node: N,
-        *,
-        name: str | None = None,
-        group: str | None = None,
-        priority: int = 0,
-        max_rate_hz: float | None = None,
-        on_error: OnError = "stop",
-        restart_limit: int = 5,
-        restart_backoff_s: float = 0.1,
-        max_duration_s: float | None = None,
-        retries: int = 0,
-        retry_on: Errors = (),
-        retry_backoff_s: float = 0.1,
-        retry_backoff_max_s: float = 30.0,
-        retry_jitter: float = 0.0,
-        concurrency: int = 1,
-        ordered: bool = True,
-        release: Release = "auto",
-        active_for_s: float | None = None,
-        deadline_s: float | None = None,
-        enabled: bool = True,
-        iterate_over: Iterable[str] = (),
-    ) -> N:
-        """Add a node and give it back; a subgraph builds its inside now.
+    def add(self, node: N, *, name: str | None = None, **options: Unpack[NodeGiven]) -> N:
+        """Add a node and return it; a subgraph builds its inside now.
 
         Args:
           node: belongs to no graph yet.
           name: its part of the path; by default the type's name, then with _2, _3, in order of adding.
-          group: where it runs, as declared with `group`; by default that of the subgraph around it, else the loop.
-          priority: higher first, in a group with policy "priority".
-          max_rate_hz: at most so many firings a second, on a grid that begins with the first (rule F11).
-          on_error: what follows when its code fails (rule X1).
-          restart_limit: for "restart": how often.
-          restart_backoff_s: for "restart": the first pause.
-          max_duration_s: the time limit of a firing, and of each attempt at it (rule X2).
-          retries: how often a firing that fails is tried again with the same values, before `on_error` counts.
-          retry_on: only these errors, and those derived from them, are tried again: classes or their names,
-            "ConnectionError", "my_robot.nodes:NoAnswer"; by default all are.
-          retry_backoff_s: the pause before the first retry; each further one is twice as long.
-          retry_backoff_max_s: no pause is longer.
-          retry_jitter: by which part of it a pause may be shorter, drawn by the run's seed: from 0, never, to 1.
-          concurrency: how many firings of it may be under way at once (rule F14): of an async function, or in a group
-            with as many threads.
-          ordered: with concurrency: outputs leave in the order in which the firings began; else as they are over.
-          release: when what it takes counts as processed (rule F5).
-          active_for_s: how long it may stay active before its `timeout` (rule A12).
-          deadline_s: how old a token may become, in a group with policy "deadline" (rule R2).
-          enabled: whether it is at the start of a run.
-          iterate_over: of a subgraph: inputs that take collections (rule G4).
+          **options: how it runs; `help(hfg.graph.NodeOptions)` and docs/reference.md list all.
 
         Raises:
           GraphError: the name is taken or not allowed, an option is out of its range, or the node is in a graph
             already; nothing was changed.
         """
-        said: dict[str, object] = {
-            "group": group,
-            "priority": priority,
-            "max_rate_hz": max_rate_hz,
-            "on_error": on_error,
-            "restart_limit": restart_limit,
-            "restart_backoff_s": restart_backoff_s,
-            "max_duration_s": max_duration_s,
-            "retries": retries,
-            "retry_on": retry_on,
-            "retry_backoff_s": retry_backoff_s,
-            "retry_backoff_max_s": retry_backoff_max_s,
-            "retry_jitter": retry_jitter,
-            "concurrency": concurrency,
-            "ordered": ordered,
-            "release": release,
-            "active_for_s": active_for_s,
-            "deadline_s": deadline_s,
-            "enabled": enabled,
-            "iterate_over": iterate_over,
-        }
-        add(self._level, node, name, said)
+        _need_known(NodeOptions, options, "graph.add")
+        add(self._level, node, name, options)
         return node
 
     @overload
-    def connect(
-        self,
-        source: Source[T],
-        target: Target[T],
-        *,
-        active: bool = False,
-        capacity: int = DEFAULT_CAPACITY,
-        overflow: Overflow = "wait",
-        capacity_limit: int | None = None,
-        through: Iterable[Callable[[Observable[Any]], Observable[Any]]] = (),
-        initial: Iterable[T] = (),
-        buffer: int = 0,
-    ) -> Edge: ...
+    def connect(self, source: Source[T], target: Target[T], **options: Unpack[EdgeGiven[T, Through]]) -> Edge: ...
     @overload
     def connect(
         self,
         source: Observable[T] | Observable[Token[T]],
         target: Target[T],
-        *,
-        active: bool = False,
-        capacity: int = DEFAULT_CAPACITY,
-        overflow: Overflow = "wait",
-        capacity_limit: int | None = None,
-        through: Iterable[Callable[[Observable[Any]], Observable[Any]]] = (),
-        initial: Iterable[T] = (),
-        buffer: int = 0,
+        **options: Unpack[EdgeGiven[T, Through]],
     ) -> Edge: ...
     @overload
-    def connect(
-        self,
-        source: str,
-        target: Target[Any] | str,
-        *,
-        active: bool = False,
-        capacity: int = DEFAULT_CAPACITY,
-        overflow: Overflow = "wait",
-        capacity_limit: int | None = None,
-        through: Iterable[Callable[[Observable[Any]], Observable[Any]]] = (),
-        initial: Iterable[Any] = (),
-        buffer: int = 0,
-    ) -> Edge: ...
+    def connect(self, source: str, target: Target[Any] | str, **options: Unpack[EdgeGiven[Any, Through]]) -> Edge: ...
     @overload
     def connect(
-        self,
-        source: Source[Any] | Observable[Any],
-        target: str,
-        *,
-        active: bool = False,
-        capacity: int = DEFAULT_CAPACITY,
-        overflow: Overflow = "wait",
-        capacity_limit: int | None = None,
-        through: Iterable[Callable[[Observable[Any]], Observable[Any]]] = (),
-        initial: Iterable[Any] = (),
-        buffer: int = 0,
+        self, source: Source[Any] | Observable[Any], target: str, **options: Unpack[EdgeGiven[Any, Through]]
     ) -> Edge: ...
-    def connect(
-        self,
-        source: Any,
-        target: Any,
-        *,
-        active: bool = False,
-        capacity: int = DEFAULT_CAPACITY,
-        overflow: Overflow = "wait",
-        capacity_limit: int | None = None,
-        through: Iterable[Any] = (),
-        initial: Iterable[Any] = (),
-        buffer: int = 0,
-    ) -> Edge:
+    def connect(self, source: Any, target: Any, **options: Unpack[EdgeGiven]) -> Edge:
         """Declare an edge from an output or event to an input or slot; a reactivex observable feeds from outside.
 
         Args:
           source: where it begins: the port, or its path, "fetch/camera.out".
           target: where it ends, in the same way.
-          active: it also transports activity, the double line of the paper.
-          capacity: of an event edge: how many untaken signals it holds (rule P5).
-          overflow: of an event edge: what happens to more of them.
-          capacity_limit: of an event edge: how far "wait" may let the queue grow (rule F8).
-          through: of an event edge: reactivex operators on the way (rule P9).
-          initial: values that lie on it at the start, the oldest first (rule P7).
-          buffer: of an edge from an output into an input: by how many tokens the producer may run ahead (rule P4).
+          **options: how it transports; `help(hfg.graph.EdgeOptions)` and docs/reference.md list all.
 
         Raises:
           ConnectionError: the edge cannot be; nothing was changed.
           GraphError: a path leads nowhere.
         """
-        said = {
-            "active": active,
-            "capacity": capacity,
-            "overflow": overflow,
-            "capacity_limit": capacity_limit,
-            "through": through,
-            "initial": initial,
-            "buffer": buffer,
-        }
-        return connect(self._level, source, target, said)
+        _need_known(EdgeOptions, options, "graph.connect")
+        return connect(self._level, source, target, options)
 
     # --- groups and gates ---
 
-    def group(
-        self,
-        name: str,
-        *,
-        threads: int | None = None,
-        policy: Policy = "fifo",
-        seed: int | None = None,
-        process: bool = False,
-        host: str | None = None,
-        ledger: bool | str | os.PathLike[str] = False,
-        may_misalign: bool = False,
-    ) -> GroupSpec:
+    def group(self, name: str, **options: Unpack[GroupGiven]) -> GroupSpec:
         """Declare where nodes run; groups belong to the whole graph, wherever they are declared.
 
         Args:
           name: what `add(..., group=name)` refers to; "loop" is the event loop, of which only the policy can be chosen.
-          threads: 1 for a thread of its own (the default), more for as many, 0 for the event loop (the default where
-            there is a process).
-          policy: who is first when several can run (rule R2).
-          seed: for policy "random"; by default the run's.
-          process: True for a process of its own; edges to and from its nodes become links (rule L1).
-          host: the agent that is to run that process, as in host="arm"; it implies `process`.
-          ledger: True: what the process has done, its `hfg.State` and its places on all edges are kept together, so
-            that another goes on from there when it dies, with nothing lost or doubled. A path: in that file as well, so
-            that the next run goes on, too.
-          may_misalign: the run goes on when that process dies although nobody can know how many tokens are lost with it
-            and a join behind it may pair what does not belong together; else it fails then (rule L2). `hfg check` says
-            where that is so.
+          **options: what it is; `help(hfg.graph.GroupSpec)` and docs/reference.md list all.
 
         Raises:
           GraphError: a value is out of its range, or the group is declared otherwise already.
         """
-        return declare_group(self._level, name, threads, policy, seed, process, host, ledger, may_misalign)
+        _need_known(GroupSpec, options, "graph.group")
+        return declare_group(self._level, name, options)
 
     def move(self, node: Node | str, *, group: str | None) -> None:
         """Let a node run in another group; with a subgraph go all inside that have no group of their own.
@@ -581,6 +431,13 @@ class Graph:
     def _run(self) -> object | None:
         """The run that it has as a whole, if any; asked by events."""
         return self._level.whole.run
+
+
+def _need_known(kind: type[Fields], options: Iterable[str], call: str) -> None:
+    """Refuse what Python refuses of a call whose arguments are written out."""
+    wrong = unknown(kind, options, call) if options else None
+    if wrong is not None:
+        raise TypeError(f"{call}: {wrong}")
 
 
 def _face_of(level: Level) -> Graph:

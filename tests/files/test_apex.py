@@ -494,7 +494,7 @@ def test_a_subgraph_iterates_over_the_inputs_that_its_bits_name() -> None:
     bits = "iterate_containers: {type: value, bool: true}, iterated_containers: {type: bitset, int: 1}"
     text = SUBGRAPH.replace("iterate_containers: {type: value, bool: false}", bits)
     document, _ = imported(text)
-    assert document.nodes["Graph_0"].iterate_over == ["in_0"]
+    assert document.nodes["Graph_0"].iterate_over == ("in_0",)
 
 
 # --- sets, by their texts ---

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import annotated_types as at
+import msgspec
 import pytest
 import reactivex
 import reactivex.operators as ops
@@ -163,7 +164,7 @@ def straight(**behind: Any) -> hfg.Graph:
 @pytest.mark.rule("G1")
 def test_a_border_that_would_give_an_edge_another_queue_is_refused() -> None:
     graph = straight(overflow="latest")
-    assert flatten(graph).edges[0].capacity == 3
+    assert flatten(graph).edges[0].options.capacity == 3
     before = drawn(graph)
     message = (
         "grouping would change the queue of source.processed -> box.heard, which runs through a subgraph and on as "
@@ -175,9 +176,9 @@ def test_a_border_that_would_give_an_edge_another_queue_is_refused() -> None:
     assert drawn(graph) == before
     for members in (("box",), ("box", "tally"), ("source", "tally"), ("source",), ("source", "box", "tally")):
         graph.edit(c.Enclose(members, "group"))
-        assert flatten(graph).edges[0].capacity == 3
+        assert flatten(graph).edges[0].options.capacity == 3
         graph.edit(c.Dissolve("group"))
-        assert flatten(graph).edges[0].capacity == 3
+        assert flatten(graph).edges[0].options.capacity == 3
 
 
 @pytest.mark.rule("G1")
@@ -185,11 +186,11 @@ def test_taking_a_border_away_that_gives_an_edge_its_queue_is_refused() -> None:
     graph = straight(capacity=3)
     graph.edit(c.Enclose(("source", "box"), "group"))
     graph.edit(c.SetEdge("group.told", "tally.activate", capacity=5))
-    assert flatten(graph).edges[0].capacity == 5
+    assert flatten(graph).edges[0].options.capacity == 5
     with pytest.raises(GraphError, match=r"dissolving would change the queue of .*capacity=3.*capacity=5"):
         graph.edit(c.Dissolve("group"))
     graph.edit(c.SetEdge("group/source.processed", "group/box.heard", capacity=5), c.Dissolve("group"))
-    assert flatten(graph).edges[0].capacity == 5
+    assert flatten(graph).edges[0].options.capacity == 5
 
 
 @pytest.mark.rule("G1", "R4")
@@ -214,7 +215,7 @@ def ends(graph: hfg.Graph) -> dict[object, list[object]]:
     """By port: where its edges lead, in order, and all that is said about them."""
     found: dict[object, list[object]] = {}
     for edge in flatten(graph).edges:
-        said = (edge.active, edge.capacity, edge.overflow, edge.capacity_limit, edge.through, edge.initial, edge.buffer)
+        said = msgspec.structs.astuple(edge.options)
         found.setdefault(edge.source.port, []).append((edge.target.port, *said))
     return found
 
@@ -664,9 +665,9 @@ def test_groups_are_declared_changed_and_removed_and_all_is_undone() -> None:
         states.append(drawn(graph))
     assert [state["groups"].get("work") for state in states] == [
         None,
-        GroupSpec("work", 1),
-        GroupSpec("work", 0, "random", 4),
-        GroupSpec("work", 0, "random"),
+        GroupSpec("work", threads=1),
+        GroupSpec("work", threads=0, policy="random", seed=4),
+        GroupSpec("work", threads=0, policy="random"),
         None,
         None,
     ]
@@ -693,10 +694,7 @@ def test_the_history_tells_what_can_be_taken_back_and_cannot_be_written() -> Non
 
 def ends_by_path(graph: hfg.Graph) -> list[object]:
     """What a run sees of them."""
-    return [
-        (flat.label, flat.active, flat.capacity, flat.overflow, flat.through, flat.initial, flat.buffer)
-        for flat in flatten(graph).edges
-    ]
+    return [(flat.label, *msgspec.structs.astuple(flat.options)) for flat in flatten(graph).edges]
 
 
 # --- refusals: one clear sentence, nothing changed ---
@@ -716,7 +714,7 @@ REFUSED = [
     (c.Add("no_such_module:x", "x"), 'node "x": node type "no_such_module:x": no module named "no_such_module"'),
     (c.Add("hfg.testing.nodes:doubel", "x"), 'module "hfg.testing.nodes" has no "doubel"'),
     (c.Add("hfg.testing.nodes:double", "x", {"size": 3}), 'node "x": double has no parameter "size"'),
-    (c.Add("hfg.testing.nodes:double", "x", {}, {"rate": 3}), "options are those of graph.add"),
+    (c.Add("hfg.testing.nodes:double", "x", {}, {"rate": 3}), "options are those of graph.add"),  # type: ignore[typeddict-unknown-key]
     (c.Replace("first", "hfg.testing.nodes:sink"), 'which has no output "out", and that is in use'),
     (c.Move("first", "gpu"), "which is not declared"),
     (c.Dissolve("first"), '"first" is no subgraph, so it cannot be dissolved'),
@@ -786,7 +784,7 @@ REFUSED = [
     (c.AddSubgraph("box", {"a": "itn"}), 'port "box.a": "itn" is no type (there is no itn)'),
     (c.AddSubgraph("box", {"a": 3}), 'port "box.a": a type is given as a text, got 3'),  # type: ignore[dict-item]
     (c.AddSubgraph("first"), 'graph "chain" has a node "first" already'),
-    (c.AddSubgraph("box", {}, {}, {}, {}, {"rate": 3}), "options are those of graph.add"),
+    (c.AddSubgraph("box", {}, {}, {}, {}, {"rate": 3}), "options are those of graph.add"),  # type: ignore[typeddict-unknown-key]
 ]
 
 

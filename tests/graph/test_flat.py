@@ -170,8 +170,12 @@ def test_outer_queue_holds_operators_follow_each_other_and_initial_tokens_add_up
     graph.connect(one.seen, two.a, capacity=7, overflow="drop_oldest", through=[second], initial=[3])
     (edge,) = flatten(graph).edges
     assert edge.label == "queue/unit.seen -> queue_2/unit.a"
-    assert (edge.capacity, edge.overflow, edge.through) == (7, "drop_oldest", (first, second, third))
-    assert edge.initial == (1, 2, 3)  # nearest to the consumer is taken first
+    assert (edge.options.capacity, edge.options.overflow, edge.options.through) == (
+        7,
+        "drop_oldest",
+        (first, second, third),
+    )
+    assert edge.options.initial == (1, 2, 3)  # nearest to the consumer is taken first
 
 
 @pytest.mark.rule("G2")

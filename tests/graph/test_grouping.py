@@ -162,9 +162,9 @@ def edges_of(flat: FlatGraph) -> set[tuple[Any, ...]]:
         (
             *(f"{flat.nodes[end.node].path.rpartition('/')[2]}.{end.name}" for end in (edge.source, edge.target)),
             edge.active,
-            edge.initial,
-            edge.buffer,
-            (edge.capacity, edge.overflow) if edge.is_event_edge else None,
+            edge.options.initial,
+            edge.options.buffer,
+            (edge.options.capacity, edge.options.overflow) if edge.is_event_edge else None,
         )
         for edge in flat.edges
     }

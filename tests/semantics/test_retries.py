@@ -13,6 +13,7 @@ import pytest
 
 import hfg
 from hfg import END, NO_MESSAGE, commands
+from hfg.graph import NodeGiven
 from hfg.testing import Recorder, reference_run
 from hfg.testing.nodes import Unsteady, script
 from hfg.trace import ErrorRaised, FiringEnded, FiringRetried, FiringStarted, TraceEvent
@@ -361,7 +362,7 @@ def test_a_file_names_them_and_brings_no_code_with_it(tmp_path: Path) -> None:
 @pytest.mark.rule("X1", "R4", "G1")
 def test_edits_copies_and_boxes_keep_them() -> None:
     graph = hfg.Graph()
-    options: dict[str, Any] = {"retries": 1, "retry_on": [f"{__name__}:NoAnswer"]}
+    options: NodeGiven = {"retries": 1, "retry_on": [f"{__name__}:NoAnswer"]}
     graph.edit(commands.Add(named(asks), "asks", options=options))
     wanted = graph["asks"]._options
     assert wanted.retry_on == (f"{__name__}:NoAnswer",)

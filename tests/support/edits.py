@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from hfg.graph import Graph
+from hfg.graph import Graph, NodeGiven
 from hfg.graph import commands as c
 from hfg.graph.structure.level import level_of
 from hfg.testing.making import Chooser
@@ -129,7 +129,7 @@ def _all_nodes(graph: Graph) -> list[Any]:
 def _add(graph: Graph, choose: Chooser, name: str) -> c.Command:
     boxes = ["", *(f"{node.place.path}/" for node in _all_nodes(graph) if hasattr(node, "_graph"))]
     kind = choose.one_of(_TYPES)
-    options: dict[str, Any] = {"release": "pipelined"} if choose.chance(20) else {}
+    options: NodeGiven = {"release": "pipelined"} if choose.chance(20) else {}
     if choose.chance(10):
         options["max_rate_hz"] = 70.0
     return c.Add(f"hfg.testing.nodes:{kind}", choose.one_of(boxes) + name, {}, options)

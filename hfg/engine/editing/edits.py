@@ -353,9 +353,9 @@ class Edits:
         lifecycle.end_tasks(edit.come)
         for edge, flat in new:
             if flat.source.kind == "observable":
-                self._lifetime.feed(flat.source.port, edge, flat.through)
-            elif flat.through:
-                self._lifetime.pipe(edge, flat.through)
+                self._lifetime.feed(flat.source.port, edge, flat.options.through)
+            elif flat.options.through:
+                self._lifetime.pipe(edge, flat.options.through)
         for edge in how.lost:
             self._lifetime.forget(edge)
         self._tell_parameters(edit.changes)

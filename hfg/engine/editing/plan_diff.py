@@ -262,7 +262,7 @@ class _Comparing:
                     waiting.append(around.owner.ports.parameters[name])
 
     def _ends_of(self, way: FlatEdge) -> tuple[Any, ...]:
-        roomy = bool(way.initial or way.buffer) and not way.is_event_edge  # another kind of edge
+        roomy = bool(way.options.initial or way.options.buffer) and not way.is_event_edge  # another kind of edge
         source, target = way.source, way.target
         begin, end = self._of_node(source.port) or source.port, self._of_node(target.port) or target.port
         return begin, _kind(source.port), source.name, end, _kind(target.port), target.name, roomy
@@ -305,7 +305,7 @@ class _Comparing:
         joined = [
             (self._old_node(way.source.port), self._old_node(way.target.port))
             for way, running in self.found.ways
-            if running is None and not way.is_event_edge and not way.initial and way.target.kind in _JOINED
+            if running is None and not way.is_event_edge and not way.options.initial and way.target.kind in _JOINED
             if way.source.node != ROOT and way.target.node != ROOT
         ]
         return self.index.order.closes_a_ring(joined, self.found.lost)
@@ -330,9 +330,13 @@ class _Comparing:
             return False
         if len(way.segments) == 1 and way.segments[0].source is source and way.segments[0].target is target:
             return True
-        if way.through or is_feed(source) or why_not(type_of(source), type_of(target)) is not None:
+        if way.options.through or is_feed(source) or why_not(type_of(source), type_of(target)) is not None:
             return False
-        return not way.initial and not way.buffer and not any(part.options.for_events for part in way.segments)
+        return (
+            not way.options.initial
+            and not way.options.buffer
+            and not any(part.options.first_said("events") for part in way.segments)
+        )
 
     def _are_doubled(self, changes: Sequence[tuple[FlatEdge, Any]]) -> bool:
         """Whether an input may have two edges, or two ports be connected twice (P2)."""

@@ -146,9 +146,9 @@ def _add_edge(core: Core, flat: FlatEdge, ends: Ends) -> None:
     core.edges.append(edge)
     wire(edge, flat)
     if flat.source.kind == "observable":
-        core.observables.append((flat.source.port, edge, flat.through))
-    elif flat.through:
-        core.piped.append((edge, flat.through))
+        core.observables.append((flat.source.port, edge, flat.options.through))
+    elif flat.options.through:
+        core.piped.append((edge, flat.options.through))
         edge.pipe(_not_piped_yet, None)
 
 
@@ -275,12 +275,19 @@ def make_worker(core: Core, flat_node: FlatNode, groups: Mapping[str, Group]) ->
 def make_edge(core: Core, flat: FlatEdge, ends: Ends) -> Any:
     """Make a running edge; it is not wired yet."""
     edge: Any
+    options = flat.options
     if flat.is_event_edge:
         edge = EventEdge(
-            flat.index, flat.label, flat.active, flat.capacity, flat.overflow, flat.capacity_limit, flat.initial
+            flat.index,
+            flat.label,
+            options.active,
+            options.capacity,
+            options.overflow,
+            options.capacity_limit,
+            options.initial,
         )
-    elif flat.initial or flat.buffer:
-        edge = BufferEdge(flat.index, flat.label, flat.active, flat.initial, flat.buffer)
+    elif options.initial or options.buffer:
+        edge = BufferEdge(flat.index, flat.label, flat.active, options.initial, options.buffer)
     else:
         edge = SyncEdge(flat.index, flat.label, flat.active)
     ends.join(edge, flat)

@@ -326,11 +326,11 @@ class _Converting:
         said = node.parameters.get("iterated_containers")
         names = list(made.graph.inputs)
         if said is not None and isinstance(said.value, int):
-            made.iterate_over = [name for bit, name in enumerate(names) if said.value >> bit & 1]
+            made.iterate_over = tuple(name for bit, name in enumerate(names) if said.value >> bit & 1)
         elif said is not None and isinstance(said.value, list):
-            made.iterate_over = [name for name in names if any(str(one).endswith(name) for one in said.value)]
+            made.iterate_over = tuple(name for name in names if any(str(one).endswith(name) for one in said.value))
         if not made.iterate_over and names:
-            made.iterate_over = names[:1]
+            made.iterate_over = (names[0],)
             told.differs("it iterates over its first input, for the file names none")
 
     # --- connections ---

@@ -33,12 +33,12 @@ def joined_edges(flat: FlatGraph) -> Iterator[Problem]:
         if len(edge.segments) == 1:
             continue
         yield from _mismatch(edge)
-        said = next((part for part in edge.segments if part.options.for_events), None)
+        said = next((part for part in edge.segments if part.options.first_said("events")), None)
         if said is not None and not edge.is_event_edge:
             yield Problem(
                 path=edge.label,
                 severity="error",
-                what=f"{said.options.for_events} is said on {said.label}, a part of it",
+                what=f"{said.options.first_said('events')} is said on {said.label}, a part of it",
                 why="it comes from an output, and such an edge holds one token and no queue (rule P4)",
                 remedy="leave it out, or send by an event",
                 check="queue-on-data",
@@ -53,7 +53,7 @@ def joined_edges(flat: FlatGraph) -> Iterator[Problem]:
                 remedy="leave it out, or send by an event and say capacity=",
                 check="buffer-without-join",
             )
-        if edge.initial and (kind == "slot" or (kind == "parameter" and edge.is_event_edge)):
+        if edge.options.initial and (kind == "slot" or (kind == "parameter" and edge.is_event_edge)):
             yield Problem(
                 path=edge.label,
                 severity="error",
@@ -67,7 +67,7 @@ def joined_edges(flat: FlatGraph) -> Iterator[Problem]:
 def _mismatch(edge: FlatEdge) -> Iterator[Problem]:
     """Each part fits its neighbours, as a relay of type Any does, and yet the ends do not fit each other."""
     source, target = edge.source.port, edge.target.port
-    if edge.through or is_feed(source):
+    if edge.options.through or is_feed(source):
         return
     sent, taken = type_of(source), type_of(target)
     reason = why_not(sent, taken)

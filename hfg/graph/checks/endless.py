@@ -64,7 +64,7 @@ def _neighbours(flat: FlatGraph) -> dict[int, list[int]]:
     """The ends of the edges that may hold back where they begin; queues that drop do not."""
     found: dict[int, list[int]] = {}
     for edge in flat.edges:
-        if not edge.is_event_edge or edge.overflow == "wait":
+        if not edge.is_event_edge or edge.options.overflow == "wait":
             found.setdefault(edge.source.node, []).append(edge.target.node)
     return found
 

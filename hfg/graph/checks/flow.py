@@ -125,7 +125,7 @@ def _data_neighbours(flat: FlatGraph) -> tuple[list[list[int]], list[list[int]]]
         if not (_begins_enabled(flat, source) and _begins_enabled(flat, target)):
             continue  # such an edge is not live, so nobody waits for it
         feeds[target].append(source)
-        if not edge.initial:
+        if not edge.options.initial:
             waits[source].append(target)
     return waits, feeds
 
@@ -192,9 +192,9 @@ def filling_rings(flat: FlatGraph) -> Iterator[Problem]:
         and edge.target.kind in ("slot", "input")
         and edge.source.node > ROOT
         and edge.target.node > ROOT
-        and edge.overflow not in bounded
-        and edge.capacity_limit is None
-        and not edge.through
+        and edge.options.overflow not in bounded
+        and edge.options.capacity_limit is None
+        and not edge.options.through
     ]
     successors: list[list[int]] = [[] for _ in flat.nodes]
     for edge in lossless:
@@ -235,7 +235,7 @@ def waiting_rings(flat: FlatGraph) -> Iterator[Problem]:
     for part in rings(successors):
         members = set(part)
         inside = [edge for edge in edges if edge.source.node in members and edge.target.node in members]
-        queues = [edge for edge in inside if edge.source.kind == "event" and edge.overflow == "wait"]
+        queues = [edge for edge in inside if edge.source.kind == "event" and edge.options.overflow == "wait"]
         circle = _circle(flat, shortest_ring(part, successors))
         yield from _short_queues(part, inside, queues, circle)
         often = [edge for edge in queues if not edge.active and _may_trigger_often(flat, edge)]
@@ -244,8 +244,8 @@ def waiting_rings(flat: FlatGraph) -> Iterator[Problem]:
                 path=often[0].label,
                 severity="hint",
                 what=f"signals go round, and one firing or call may trigger many of them: {circle}",
-                why=f"when {often[0].capacity} lie there its node waits, and where the others wait for it the queue "
-                "grows (rule F8); how many there may be nobody can tell from outside",
+                why=f"when {often[0].options.capacity} lie there its node waits, and where the others wait for it the "
+                "queue grows (rule F8); how many there may be nobody can tell from outside",
                 remedy="say capacity= as many as may be on their way at once and one more, and it need not grow; or "
                 "bound it by capacity_limit=",
                 check="waiting-ring",
@@ -260,13 +260,13 @@ def _short_queues(part: list[int], inside: list[FlatEdge], queues: list[FlatEdge
     )
     if not told_once or len(inside) != len(part) or any(edge.target.kind != "input" for edge in inside):
         return
-    count = sum(len(edge.initial) for edge in inside)
+    count = sum(len(edge.options.initial) for edge in inside)
     for edge in queues:
-        if edge.capacity <= count:
+        if edge.options.capacity <= count:
             yield Problem(
                 path=edge.label,
                 severity="hint",
-                what=f"{count} signals go round, and capacity={edge.capacity} holds its node back: {circle}",
+                what=f"{count} signals go round, and capacity={edge.options.capacity} holds its node back: {circle}",
                 why="where all nodes of the ring wait for each other the queue grows (rule F8)",
                 remedy=f"say capacity={count + 1}, and it need not grow",
                 check="waiting-ring",
@@ -377,7 +377,7 @@ def _successors(flat: FlatGraph, edges: Iterable[FlatEdge]) -> list[list[int]]:
     for edge in edges:
         source, target = edge.source.node, edge.target.node
         joins = edge.target.kind == "input" or (edge.target.kind == "parameter" and not edge.is_event_edge)
-        if source > ROOT and target > ROOT and joins and not edge.initial:
+        if source > ROOT and target > ROOT and joins and not edge.options.initial:
             successors[source].append(target)
     return successors
 

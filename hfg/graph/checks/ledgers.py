@@ -61,7 +61,7 @@ def _of_edge(group: str, edge: FlatEdge) -> Iterator[Problem]:
     path = edge.label
     if edge.active:
         yield _wrong(group, path, "the edge is active, and activity is not kept", "leave active= out")
-    if edge.through and edge.source.node != LINK:
+    if edge.options.through and edge.source.node != LINK:
         yield _wrong(
             group,
             path,
@@ -80,7 +80,7 @@ def _of_edge(group: str, edge: FlatEdge) -> Iterator[Problem]:
         )
     if edge.source.kind == "observable":
         yield _wrong(group, path, "an observable feeds it, which nobody can ask where it goes on")
-    if edge.initial and edge.source.node == LINK:
+    if edge.options.initial and edge.source.node == LINK:
         yield _wrong(
             group, path, "it comes from another process with initial values", "give them to an edge within the group"
         )

@@ -41,7 +41,9 @@ def _rings_across(flat: FlatGraph, crossing: set[int]) -> Iterator[Problem]:
     waiting = [
         edge
         for edge in flat.edges
-        if edge.source.kind == "event" and edge.overflow == "wait" and min(edge.source.node, edge.target.node) >= 0
+        if edge.source.kind == "event"
+        and edge.options.overflow == "wait"
+        and min(edge.source.node, edge.target.node) >= 0
     ]
     successors: list[list[int]] = [[] for _ in flat.nodes]
     for edge in waiting:
@@ -56,7 +58,7 @@ def _rings_across(flat: FlatGraph, crossing: set[int]) -> Iterator[Problem]:
                 severity="error",
                 what="a ring of edges whose queues wait leads through another process",
                 why="if they all wait for each other, no process can see that its queues must grow (rule F8)",
-                remedy='run all nodes of the ring in one group, or give an edge of it overflow="latest", "drop_oldest", '
-                '"drop_newest" or "error"',
+                remedy='run all nodes of the ring in one group, or give an edge of it overflow="latest", '
+                '"drop_oldest", "drop_newest" or "error"',
                 check="process-border",
             )

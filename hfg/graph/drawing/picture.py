@@ -16,7 +16,8 @@ from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, is_feed, is_port
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import HasLevel, Level, inside, level_of
 from hfg.graph.structure.naming import path_of
-from hfg.graph.structure.options import DEFAULT_CAPACITY, EdgeOptions, NodeOptions
+from hfg.graph.structure.option import declared
+from hfg.graph.structure.options import EdgeOptions, NodeOptions
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node, NodeType
 from hfg.ports import InnerSource, InnerTarget, Port
@@ -26,7 +27,6 @@ __all__ = ["EVERYTHING", "Arrow", "Box", "Look", "Picture", "Pin", "Shape", "Vie
 Look: TypeAlias = Literal["node", "port", "start", "stop", "feed"]
 
 _LAST: Final = 1_000_000  # ports that every node has are behind its own
-_LONGEST: Final = 40  # characters of an initial value
 
 
 class View(msgspec.Struct, frozen=True):
@@ -273,7 +273,7 @@ class _Look:
     def _edge(self, edge: Edge) -> None:
         ends = self._end(edge.source), self._end(edge.target)
         is_signal = is_feed(edge.source) or edge.source.kind in ("event", "slot")
-        said = ", ".join(_options(edge.options))
+        said = ", ".join(_badges(edge.options))
         label = ", ".join(part for part in (_ports_label(edge), said) if part)
         pins = self._pin(edge.source, _source_name(edge.source)), self._pin(edge.target, _target_name(edge.target))
         arrow = Arrow(*ends, label, *pins, said, is_signal, edge.active, is_back=bool(edge.options.initial))
@@ -412,16 +412,14 @@ def _declared(node: Node) -> dict[tuple[str, str], int]:
 
 
 def _details(options: NodeOptions, kind: NodeType) -> list[str]:
-    said = ["do"] if "do" in kind.hooks else []
-    if options.max_rate_hz is not None:
-        said.append(f"{options.max_rate_hz:g} Hz")
-    if options.active_for_s is not None:
-        said.append(f"active for {options.active_for_s:g} s")
-    if not options.enabled:
-        said.append("disabled")
-    if options.iterate_over:
-        said.append(f"for each of {', '.join(options.iterate_over)}")
-    return said
+    return (["do"] if "do" in kind.hooks else []) + _badges(options)
+
+
+def _badges(options: EdgeOptions | NodeOptions) -> list[str]:
+    """Return what a drawing shows of options that are not as usual."""
+    known, said = declared(type(options)), options.said()
+    ranked = sorted(said, key=lambda name: known[name].option.rank)
+    return [badge for name in ranked if (badge := known[name].badge(said[name]))]
 
 
 def _ports_label(edge: Edge) -> str:
@@ -450,21 +448,3 @@ def _target_name(end: SourceEnd) -> str:
 
 def _is_on_node(end: SourceEnd) -> TypeGuard[Port]:
     return isinstance(end, Port) and isinstance(end.node, Node) and not is_box(end.node)
-
-
-def _options(options: EdgeOptions) -> Iterator[str]:
-    if options.overflow != "wait":
-        yield options.overflow
-    if options.capacity != DEFAULT_CAPACITY and options.overflow != "latest":
-        yield f"capacity {options.capacity}"
-    if options.capacity_limit is not None:
-        yield f"at most {options.capacity_limit}"
-    if options.through:
-        count = len(options.through)
-        yield "1 operator" if count == 1 else f"{count} operators"
-    if options.buffer:
-        yield f"buffer {options.buffer}"
-    if options.initial:
-        values = [repr(value) for value in options.initial]
-        text = ", ".join(value if len(value) <= _LONGEST else f"{value[: _LONGEST - 1]}…" for value in values[:4])
-        yield f"initial {text}" + (f" and {len(values) - 4} more" if len(values) > 4 else "")

@@ -7,14 +7,15 @@ A command can be logged, sent over a wire and carried out again: `encode` and `d
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, Unpack, cast
 
 import msgspec
 
 from hfg.base.hooks import hooks
 from hfg.encoding import TAG
 from hfg.errors import GraphError
-from hfg.graph.structure.options import DEFAULT_CAPACITY, Overflow, Policy
+from hfg.graph.structure.option import add_unset
+from hfg.graph.structure.options import EdgeFields, EdgeGiven, GroupFields, GroupGiven, NodeGiven
 
 __all__ = [
     "Add",
@@ -30,6 +31,7 @@ __all__ = [
     "Disable",
     "Disconnect",
     "Dissolve",
+    "EdgeSaid",
     "Enable",
     "Enclose",
     "Gate",
@@ -49,6 +51,12 @@ __all__ = [
     "encode",
     "read",
 ]
+
+
+if TYPE_CHECKING:
+    NodeData: TypeAlias = NodeGiven
+else:
+    NodeData: TypeAlias = dict[str, Any]  # they are checked when the node is added, with a message that names it
 
 
 class _Sentence(msgspec.StructMeta):
@@ -93,7 +101,7 @@ class Add(Command, frozen=True):
     type: str
     path: str
     parameters: dict[str, Any] = {}
-    options: dict[str, Any] = {}
+    options: NodeData = {}
 
 
 class AddSubgraph(Command, frozen=True):
@@ -110,7 +118,7 @@ class AddSubgraph(Command, frozen=True):
     outputs: dict[str, str] = {}
     events: dict[str, str] = {}
     slots: dict[str, str] = {}
-    options: dict[str, Any] = {}
+    options: NodeData = {}
 
 
 class AddInput(Command, frozen=True):
@@ -131,26 +139,24 @@ class AddGroup(Command, frozen=True):
     """Declare where nodes run, as `graph.group` does."""
 
     name: str
-    threads: int | None = None
-    policy: Policy = "fifo"
-    seed: int | None = None
-    process: bool = False
-    host: str | None = None
-    ledger: bool | str = False
-    may_misalign: bool = False
+    if TYPE_CHECKING:
+
+        def __init__(self, name: str, **options: Unpack[GroupGiven]) -> None: ...
+
+    else:
+        add_unset(GroupFields, locals(), none=True)
 
 
 class ChangeGroup(Command, frozen=True):
     """Declare a group otherwise; what is not given stays as it was."""
 
     name: str
-    threads: int | msgspec.UnsetType = msgspec.UNSET
-    policy: Policy | msgspec.UnsetType = msgspec.UNSET
-    seed: int | msgspec.UnsetType | None = msgspec.UNSET
-    process: bool | msgspec.UnsetType = msgspec.UNSET
-    host: str | msgspec.UnsetType = msgspec.UNSET
-    ledger: bool | str | msgspec.UnsetType = msgspec.UNSET
-    may_misalign: bool | msgspec.UnsetType = msgspec.UNSET
+    if TYPE_CHECKING:
+
+        def __init__(self, name: str, **options: Unpack[GroupGiven]) -> None: ...
+
+    else:
+        add_unset(GroupFields, locals())
 
 
 class RemoveGroup(Command, frozen=True):
@@ -200,18 +206,17 @@ class Operator(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_def
     parameters: dict[str, Any] = {}
 
 
-class Connect(Command, frozen=True):
+class EdgeSaid(EdgeFields, kw_only=True):
+    """What is said of an edge as data; operators by their names."""
+
+    through: tuple[Operator, ...] = ()
+
+
+class Connect(Command, EdgeSaid, frozen=True):  # type: ignore[misc]  # nobody changes it
     """Declare an edge, as `graph.connect` does; operators by their names."""
 
     source: str
     target: str
-    active: bool = False
-    capacity: int = DEFAULT_CAPACITY
-    overflow: Overflow = "wait"
-    capacity_limit: int | None = None
-    initial: tuple[Any, ...] = ()
-    buffer: int = 0
-    through: tuple[Operator, ...] = ()
 
 
 class Disconnect(Command, frozen=True):
@@ -234,13 +239,13 @@ class SetEdge(Command, frozen=True):
 
     source: str
     target: str
-    active: bool | msgspec.UnsetType = msgspec.UNSET
-    capacity: int | msgspec.UnsetType = msgspec.UNSET
-    overflow: Overflow | msgspec.UnsetType = msgspec.UNSET
-    capacity_limit: int | msgspec.UnsetType | None = msgspec.UNSET
-    initial: tuple[Any, ...] | msgspec.UnsetType = msgspec.UNSET
-    buffer: int | msgspec.UnsetType = msgspec.UNSET
-    through: tuple[Operator, ...] | msgspec.UnsetType = msgspec.UNSET
+    if TYPE_CHECKING:
+        through: tuple[Operator, ...] | msgspec.UnsetType
+
+        def __init__(self, source: str, target: str, **options: Unpack[EdgeGiven[Any, Operator]]) -> None: ...
+
+    else:
+        add_unset(EdgeSaid, locals())
 
 
 class Enable(Command, frozen=True):

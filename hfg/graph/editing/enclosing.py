@@ -10,16 +10,15 @@ import types
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
-import msgspec
-
 from hfg.errors import GraphError, HfgError
 from hfg.graph.editing.changes import Change, EdgeChange, GateChange, NodeChange, PromotionChange
 from hfg.graph.editing.straight import refuse_other_queues
 from hfg.graph.structure.connecting import refuse
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of
+from hfg.graph.structure.joining import inner_part, joined, outer_part
 from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.naming import need_name
-from hfg.graph.structure.options import ACTIVE, PLAIN, EdgeOptions, NodeOptions, in_group
+from hfg.graph.structure.options import PLAIN_NODE, EdgeOptions, in_group
 from hfg.graph.structure.subgraph import Box
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, InnerSource, InnerTarget, Input, Output, ParameterPort, Port, slot
@@ -109,7 +108,7 @@ def _take_in(do: Do, around: Level, box: Box, name: str, members: Sequence[Node]
     for node in members:
         do(NodeChange.of(node, added=False))
     within = around.make_inside(box)
-    do(NodeChange(around, name, box, NodeOptions(), position, within, added=True))
+    do(NodeChange(around, name, box, PLAIN_NODE, position, within, added=True))
     for node, own_name, options, own_inside in places:
         do(NodeChange(within, own_name, node, options, len(within.nodes), own_inside, added=True))
     return within
@@ -178,7 +177,7 @@ def _outer_half(edge: Edge, box: Box, ports: _Names, inner: set[Node]) -> Edge |
         return None
     port = ports.port(edge, box)
     if owner_of(edge.target) in inner:
-        return Edge(edge.source, port, msgspec.structs.replace(edge.options, initial=()))
+        return Edge(edge.source, port, outer_part(edge.options))
     return Edge(port, edge.target, edge.options)
 
 
@@ -188,8 +187,8 @@ def _inner_half(edge: Edge, box: Box, ports: _Names, inner: set[Node]) -> Edge:
         return edge
     relay = ports.port(edge, box).inner
     if owner_of(edge.target) in inner:
-        return Edge(relay, edge.target, EdgeOptions(active=edge.active, initial=edge.options.initial))
-    return Edge(edge.source, relay, ACTIVE if edge.active else PLAIN)
+        return Edge(relay, edge.target, inner_part(edge.options, has_target=True))
+    return Edge(edge.source, relay, inner_part(edge.options, has_target=False))
 
 
 # --- dissolving ---
@@ -280,13 +279,9 @@ def _need_dissolvable(box: Node, levels: Sequence[Level]) -> Level:
 def _refuse_if_named(box: Node, levels: Sequence[Level]) -> None:
     """Refuse if something is said about the subgraph itself, which would have no place any more."""
     path = box.place.path
-    options = box._options
-    fitting = msgspec.structs.replace(NodeOptions(), group=options.group)
-    for name in NodeOptions.__struct_fields__:
-        if getattr(options, name) != getattr(fitting, name):
-            raise GraphError(
-                f'"{path}" cannot be dissolved: it says {name}={getattr(options, name)!r}; take that out first'
-            )
+    for name, value in box._options.said().items():
+        if name != "group":  # which the nodes inside get
+            raise GraphError(f'"{path}" cannot be dissolved: it says {name}={value!r}; take that out first')
     for level in levels:
         for gate in level.gates:
             if box in (gate.target, gate.by):
@@ -362,13 +357,4 @@ class _Border:
         if len(parts) == 1 and parts[0].source is source and parts[0].target is target:
             return parts[0]
         outside = next((one for one in parts if one not in self.within), parts[0]).options
-        options = EdgeOptions(
-            active=all(one.active for one in parts),
-            capacity=outside.capacity,
-            overflow=outside.overflow,
-            capacity_limit=outside.capacity_limit,
-            through=tuple(operator for one in parts for operator in one.options.through),
-            initial=tuple(value for one in reversed(parts) for value in one.options.initial),
-            buffer=sum(one.options.buffer for one in parts),
-        )
-        return Edge(source, target, options)
+        return Edge(source, target, joined([one.options for one in parts], outside))

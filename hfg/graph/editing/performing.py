@@ -7,7 +7,7 @@ All of a transaction or nothing: what is refused leaves the graph as it was. Sta
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import msgspec
 
@@ -33,6 +33,7 @@ from hfg.graph.editing.changes import (
     undo_all,
 )
 from hfg.graph.editing.copying import copy_of
+from hfg.graph.editing.data import edge_as_meant
 from hfg.graph.editing.enclosing import declared_box, dissolve, enclose
 from hfg.graph.editing.making import as_meant, fitting, kept, made
 from hfg.graph.editing.type_texts import type_of_text
@@ -41,15 +42,16 @@ from hfg.graph.structure.assigning import move
 from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.connecting import declare_edge, refuse
 from hfg.graph.structure.declaring import need_new_port
-from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of, type_of
+from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of
 from hfg.graph.structure.finding import same_port
 from hfg.graph.structure.fitting import need_fitting
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.gating import refuse_gate
+from hfg.graph.structure.given import edge_options, group_spec
 from hfg.graph.structure.level import Level, level_of, nodes_within
 from hfg.graph.structure.naming import need_name, suggest
-from hfg.graph.structure.operators import find_operator
-from hfg.graph.structure.options import DEFAULT_CAPACITY, GroupSpec, edge_options, group_spec
+from hfg.graph.structure.option import given
+from hfg.graph.structure.options import PLAIN, EdgeOptions, GroupSpec
 from hfg.graph.structure.places import side_of
 from hfg.graph.structure.pointing import level_and_name, node_at, parameter_at, source_at, target_at
 from hfg.graph.structure.promoting import refuse_promotion, refuse_standing, stands_for
@@ -126,7 +128,7 @@ class _Hand:
     def _add(self, command: c.Add) -> None:
         self._add_node(made(command.type, command.parameters, command.path), command.path, command.options)
 
-    def _add_node(self, node: Node, path: str, options: dict[str, Any]) -> None:
+    def _add_node(self, node: Node, path: str, options: c.NodeData) -> None:
         around, name = level_and_name(self.root, path)
         groups = self.root.whole.groups
         before = groups.state()
@@ -225,7 +227,7 @@ class _Hand:
         promoted = around.promotions.copied()
         notes = self.root.whole.notes.get(old, {})
         self.take_out(old)
-        add(around, new, name, msgspec.structs.asdict(options))
+        add(around, new, name, cast(c.NodeData, options.said()))
         added = NodeChange.of(new, added=True)
         self.changes.append(added)
         moved = NodeChange(around, name, new, added.options, position, added.inside, added=True)
@@ -261,13 +263,12 @@ class _Hand:
                 f'group "{command.name}" is declared already, as {known.by_name[command.name]}; '
                 "change it with ChangeGroup, or choose another name"
             )
-        given = msgspec.structs.asdict(command)
-        self._declare(group_spec(**given))
+        self._declare(group_spec(command.name, given(GroupSpec, command)))
 
     def _changegroup(self, command: c.ChangeGroup) -> None:
-        said = msgspec.structs.asdict(self._group(command.name))
-        given = msgspec.structs.asdict(command)
-        self._declare(group_spec(**said | {name: value for name, value in given.items() if value is not msgspec.UNSET}))
+        before = self._group(command.name)
+        said = {"threads": before.threads, **before.said(), **given(GroupSpec, command)}
+        self._declare(group_spec(command.name, said))
 
     def _declare(self, spec: GroupSpec) -> None:
         groups = self.root.whole.groups
@@ -403,15 +404,7 @@ class _Hand:
     def _connect(self, command: c.Connect) -> None:
         source, target = source_at(self.root, command.source), target_at(self.root, command.target)
         around = _level_for(self.root, source, target)
-        said = {
-            "active": command.active,
-            "capacity": command.capacity,
-            "overflow": command.overflow,
-            "capacity_limit": command.capacity_limit,
-            "through": self._operators(command),
-            "initial": _meant(command.initial, target),
-            "buffer": command.buffer,
-        }
+        said = edge_as_meant(command.said(), target, f'"{command.source}" -> "{command.target}"', as_meant)
         edge = declare_edge(around, source, target, said)
         self.changes.append(EdgeChange(around, edge, len(around.edges) - 1, added=True))
 
@@ -425,14 +418,10 @@ class _Hand:
 
     def _setedge(self, command: c.SetEdge) -> None:
         around, edge = self._edge(command.source, command.target)
-        given = {name: getattr(command, name) for name in edge.options.__struct_fields__}
-        said = {name: value for name, value in given.items() if value is not msgspec.UNSET}
-        if "initial" in said:
-            said["initial"] = _meant(said["initial"], edge.target)
-        if "through" in said:
-            said["through"] = self._operators(command)
+        where = f'"{command.source}" -> "{command.target}"'
+        said = edge_as_meant(given(EdgeOptions, command), edge.target, where, as_meant)
         if "latest" in (said.get("overflow"), edge.overflow) and said.get("overflow", edge.overflow) != edge.overflow:
-            said.setdefault("capacity", DEFAULT_CAPACITY)  # the 1 of "latest" is its own
+            said.setdefault("capacity", PLAIN.capacity)  # the 1 of "latest" is its own
         self._say(around, edge, said)
 
     def _say(self, around: Level, edge: Edge, said: dict[str, Any]) -> None:
@@ -441,26 +430,6 @@ class _Hand:
         refuse(around, edge.source, edge.target, options)
         if not same(options, edge.options):
             self.do(EdgeSwap(around, edge, Edge(edge.source, edge.target, options)))
-
-    def _operators(self, command: c.Connect | c.SetEdge) -> tuple[Any, ...]:
-        where = f'"{command.source}" -> "{command.target}"'
-        if not isinstance(command.through, tuple | list):
-            raise GraphError(f"{where}: through takes several operators, got {command.through!r}; write ([...])")
-        for one in command.through:
-            if not isinstance(one, c.Operator):
-                raise GraphError(
-                    f"{where}: a command says operators by name, got {one!r}; "
-                    'write commands.Operator("reactivex.operators:debounce", (0.2,))'
-                )
-        return tuple(
-            find_operator(
-                one.type,
-                tuple(as_meant(value, Any) for value in one.arguments),
-                {name: as_meant(value, Any) for name, value in one.parameters.items()},
-                where,
-            )
-            for one in command.through
-        )
 
     def _edge(self, source_path: str, target_path: str) -> tuple[Level, Edge]:
         source, target = source_at(self.root, source_path), target_at(self.root, target_path)
@@ -502,11 +471,6 @@ def _refuse_malformed(command: c.Command) -> None:
             raise GraphError(f"{type(command).__name__} takes name as a text, got {value!r}")
         if field == "paths" and not (isinstance(value, tuple | list) and all(isinstance(one, str) for one in value)):
             raise GraphError(f'{type(command).__name__} takes several paths, as in ("detect", "track"), got {value!r}')
-
-
-def _meant(values: Any, target: TargetEnd) -> Any:  # noqa: ANN401 - what is no list is refused with the edge
-    """Initial values that may have come over a wire."""
-    return tuple(as_meant(value, type_of(target)) for value in values) if isinstance(values, tuple | list) else values
 
 
 def _touches(edge: Edge, node: Node) -> bool:

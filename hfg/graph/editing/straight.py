@@ -11,7 +11,9 @@ from collections.abc import Callable, Iterable, Iterator
 
 from hfg.errors import GraphError
 from hfg.graph.structure.edge import Edge
+from hfg.graph.structure.joining import outermost
 from hfg.graph.structure.level import Level, inside
+from hfg.graph.structure.option import written
 from hfg.graph.structure.options import EdgeOptions
 from hfg.ports import InnerSource, InnerTarget, Port
 
@@ -37,7 +39,7 @@ def refuse_other_queues(
     """
     for edge, options in outwards:
         for first in _origins(level, edge, is_at_border):
-            if _queue(first.options) == _queue(options):
+            if outermost(first.options) == outermost(options):
                 continue
             raise GraphError(
                 f"{what} would change the queue of {first.label}, which runs through a subgraph and on as "
@@ -83,10 +85,5 @@ def _entries(within: Level, port: Port) -> list[Port]:
     return found
 
 
-def _queue(options: EdgeOptions) -> tuple[object, ...]:
-    return options.capacity, options.overflow, options.capacity_limit
-
-
 def _said(options: EdgeOptions) -> str:
-    limit = "" if options.capacity_limit is None else f", capacity_limit={options.capacity_limit}"
-    return f'capacity={options.capacity}, overflow="{options.overflow}"{limit}'
+    return ", ".join(written(name, value) for name, value in outermost(options).items() if value is not None)

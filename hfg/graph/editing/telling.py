@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 
@@ -16,21 +16,17 @@ from hfg.base.values import same
 from hfg.encoding import encode
 from hfg.errors import EncodingError, GraphError, HfgError
 from hfg.graph.editing import commands as c
+from hfg.graph.editing.data import edge_as_data
 from hfg.graph.editing.performing import perform
 from hfg.graph.editing.type_texts import text_of_type
-from hfg.graph.structure.edge import Edge, is_feed, type_of
+from hfg.graph.structure.edge import Edge, is_feed
 from hfg.graph.structure.level import Level, Whole, inside
-from hfg.graph.structure.operators import NamedOperator
-from hfg.graph.structure.options import EdgeOptions, NodeOptions
 from hfg.graph.structure.pointing import parameter_at
 from hfg.graph.structure.promoting import stands_for
 from hfg.graph.structure.subgraph import is_box, is_unnamed
 from hfg.nodetypes.node import Node
 
 __all__ = ["as_commands"]
-
-_PLAIN_NODE = NodeOptions()
-_PLAIN_EDGE = EdgeOptions()
 
 
 def as_commands(level: Level) -> list[c.Command]:
@@ -72,7 +68,7 @@ class _Telling:
         """Tell all."""
         for spec in self.root.whole.groups.by_name.values():
             if spec != self.made.whole.groups.by_name.get(spec.name):
-                self.say(c.AddGroup(**msgspec.structs.asdict(spec)))
+                self.say(c.AddGroup(spec.name, **{"threads": spec.threads, **spec.said()}))
         for name, port in self.root.ports.inputs.items():
             self.say(c.AddInput(name, _text(port.type, f'input "{name}" of the graph')))
         for name, out in self.root.ports.outputs.items():
@@ -106,7 +102,7 @@ class _Telling:
             self._tell_promotions(level)
 
     def _tell_node(self, node: Node) -> None:
-        path, options = node.place.path, _others(node._options, _PLAIN_NODE)
+        path, options = node.place.path, cast(c.NodeData, node._options.said())
         reference = node._type.reference
         if reference is not None:
             self.say(c.Add(reference, path, _parameters(node), options))
@@ -159,7 +155,7 @@ class _Telling:
                     self.say(c.Gate(target, by, gate.idle_rate_hz))
 
 
-def _subgraph(node: Node, options: dict[str, Any]) -> c.AddSubgraph:
+def _subgraph(node: Node, options: c.NodeData) -> c.AddSubgraph:
     kind, path = node._type, node.place.path
 
     def texts(specs: dict[str, Any]) -> dict[str, str]:
@@ -208,36 +204,17 @@ def _given(node: Node) -> dict[str, Any]:
     return {name: value for name, value in node._parameters.items() if node._type.parameters[name].is_given}
 
 
-def _others(said: Any, plain: Any) -> dict[str, Any]:  # noqa: ANN401 - options of nodes or of edges
-    return {name: getattr(said, name) for name in said.__struct_fields__ if getattr(said, name) != getattr(plain, name)}
-
-
 def _connected(edge: Edge) -> c.Connect:
     if is_feed(edge.source):
         raise GraphError(
             f'edge "{edge.label}": an observable from outside is code, which no command can say; '
             "connect it by hand, or feed the graph by graph.input(...)"
         )
-    said = _others(edge.options, _PLAIN_EDGE)
-    if edge.overflow == "latest":
-        del said["capacity"]  # it is 1 by that
-    if "initial" in said:
-        said["initial"] = tuple(_data(partial(encode, hint=type_of(edge.target)), one) for one in edge.options.initial)
-    if edge.options.through:
-        said["through"] = tuple(_operator(edge, one) for one in edge.options.through)
+    try:
+        said = edge_as_data(edge, lambda value, hint: _data(partial(encode, hint=hint), value))
+    except GraphError as error:
+        raise GraphError(f'edge "{edge.label}": {error}') from error
     return c.Connect(edge.source.path, edge.target.path, **said)
-
-
-def _operator(edge: Edge, operator: object) -> c.Operator:
-    reference = operator.made_by.reference if isinstance(operator, NamedOperator) else None
-    if not isinstance(operator, NamedOperator) or reference is None:
-        raise GraphError(
-            f'edge "{edge.label}": its operator {operator!r} cannot be found by name, so no command can say it; '
-            "make it by a function at the top of a module with @hfg.operator, or by one of reactivex, as in "
-            "hfg.operator(ops.debounce)(0.2)"
-        )
-    arguments = tuple(_data(encode, one) for one in operator.arguments)
-    return c.Operator(reference, arguments, {name: _data(encode, one) for name, one in operator.parameters.items()})
 
 
 def _tells_apart(inner: Level, made: Level) -> bool:

@@ -9,13 +9,13 @@ watches a part finds what he knows of the whole. Stands on `flat_graph`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Final, Literal, TypedDict, Unpack
+from typing import Any, Final, Literal, Unpack
 
 import msgspec
 
 from hfg.errors import Problem
 from hfg.graph.flat.flat_graph import LINK, ROOT, End, FlatEdge, FlatGate, FlatGraph, FlatNode, Scope, scope_end
-from hfg.graph.structure.options import GroupSpec, Overflow
+from hfg.graph.structure.options import EdgeGiven, GroupSpec
 
 __all__ = ["DEFAULT_WINDOW", "MAIN", "CutEdge", "Cutting", "cut"]
 
@@ -190,11 +190,11 @@ class _Cutter:
 
     def _cross(self, edge: FlatEdge, source: str, target: str, made: dict[str, _Part]) -> None:
         """An edge between two parts: in each of them a part of it, and what they have in common."""
-        drops = edge.is_event_edge and edge.overflow not in ("wait", "error")
+        drops = edge.is_event_edge and edge.options.overflow not in ("wait", "error")
         buffer = 0
         if not edge.is_event_edge and edge.target.kind == "input" and not self._is_sequential(edge.target):
-            buffer = edge.buffer or DEFAULT_WINDOW
-        window = edge.capacity if edge.is_event_edge else buffer + 1
+            buffer = edge.options.buffer or DEFAULT_WINDOW
+        window = edge.options.capacity if edge.is_event_edge else buffer + 1
         hint = edge.source.port.type if edge.source.kind != "observable" else edge.target.port.type
         guarantee: Literal["exact", "bounded"] = "bounded" if drops else "exact"
         within_host = self._host(source) == self._host(target)
@@ -211,16 +211,6 @@ class _Cutter:
 
     def _is_sequential(self, end: End) -> bool:
         return end.node >= 0 and self.flat.nodes[end.node].options.release == "sequential"
-
-
-class _Changes(TypedDict, total=False):
-    """What of an edge is otherwise in one of the parts."""
-
-    through: tuple[Any, ...]
-    initial: tuple[Any, ...]
-    buffer: int
-    overflow: Overflow
-    capacity_limit: int | None
 
 
 class _Part:
@@ -244,10 +234,15 @@ class _Part:
         ]
         self.flat = FlatGraph(nodes, scopes, [], flat.groups, [], flat.graph, flat.findings)
 
-    def add(self, edge: FlatEdge, source: End, target: End, **changed: Unpack[_Changes]) -> None:
+    def add(self, edge: FlatEdge, source: End, target: End, **changed: Unpack[EdgeGiven]) -> None:
         """Add an edge, or the part of it that is here."""
         self.flat.edges.append(
-            msgspec.structs.replace(edge, source=self._here(source), target=self._here(target), **changed)
+            msgspec.structs.replace(
+                edge,
+                source=self._here(source),
+                target=self._here(target),
+                options=msgspec.structs.replace(edge.options, **changed) if changed else edge.options,
+            )
         )
 
     def add_gate(self, gate: FlatGate) -> None:

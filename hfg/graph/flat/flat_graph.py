@@ -13,7 +13,7 @@ import msgspec
 from hfg.errors import Problem
 from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.level import HasLevel, Level, level_of
-from hfg.graph.structure.options import GroupSpec, NodeOptions, Overflow
+from hfg.graph.structure.options import EdgeOptions, GroupSpec, NodeOptions
 from hfg.nodetypes.node import Node
 
 __all__ = ["LINK", "ROOT", "End", "EndKind", "FlatEdge", "FlatGate", "FlatGraph", "FlatNode", "Scope", "scope_end"]
@@ -87,13 +87,8 @@ class FlatEdge(msgspec.Struct, eq=False):
 
     Attributes:
       label: "a/b.out -> c.in", one of a kind in its graph.
-      active: all edges it consists of are.
-      capacity: this and the next three say something on event edges only; with overflow and capacity_limit they are
-        those of the outermost edge it
-        consists of, among several the one nearest to the source.
-      through: operators, in the order signals meet them.
-      initial: values, the one taken first in front.
-      buffer: places beside the one that every edge of data has; those of its parts together.
+      options: of the edges it consists of together; what only one says, the outermost does, among several the one
+        nearest to the source.
       via: the scopes it enters or leaves through their ports.
       segments: the edges it consists of, from source to target.
     """
@@ -102,15 +97,14 @@ class FlatEdge(msgspec.Struct, eq=False):
     label: str
     source: End
     target: End
-    active: bool
-    capacity: int
-    overflow: Overflow
-    capacity_limit: int | None
-    through: tuple[Any, ...]
-    initial: tuple[Any, ...]
-    buffer: int
+    options: EdgeOptions
     via: tuple[int, ...]
     segments: tuple[Edge, ...]
+
+    @property
+    def active(self) -> bool:
+        """A(e) of the paper: whether it also transports activity."""
+        return self.options.active
 
     @property
     def is_event_edge(self) -> bool:

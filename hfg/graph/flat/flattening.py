@@ -17,6 +17,7 @@ from hfg.errors import Problem
 from hfg.graph.flat.flat_graph import ROOT, End, EndKind, FlatEdge, FlatGate, FlatGraph, FlatNode, Scope, scope_end
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, is_port
 from hfg.graph.structure.gates import Gate
+from hfg.graph.structure.joining import joined
 from hfg.graph.structure.level import HasLevel, Level, inside, level_of
 from hfg.graph.structure.options import NodeOptions, in_group
 from hfg.graph.structure.subgraph import iterated
@@ -177,34 +178,12 @@ class EdgeFollower:
         begin, end = self._end(source), self._end(target)
         if begin is None or end is None:
             return
-        edge = segments[0]
+        options = segments[0].options
         if len(segments) > 1:
-            edge = min(segments, key=self.depth_of.__getitem__)  # min gives the first of equals: nearest to the source
-        options = edge.options
-        through, initial, active, buffer = options.through, options.initial, options.active, options.buffer
-        if len(segments) > 1:
-            through = tuple(operator for one in segments for operator in one.options.through)
-            initial = tuple(value for one in reversed(segments) for value in one.options.initial)
-            active = all(one.options.active for one in segments)
-            buffer = sum(one.options.buffer for one in segments)
+            outer = min(segments, key=self.depth_of.__getitem__)  # min gives the first of equals: nearest to the source
+            options = joined([one.options for one in segments], outer.options)
         edges = self.flat.edges
-        edges.append(
-            FlatEdge(
-                len(edges),
-                self._label(begin, end),
-                begin,
-                end,
-                active,
-                options.capacity,
-                options.overflow,
-                options.capacity_limit,
-                through,
-                initial,
-                buffer,
-                via,
-                segments,
-            )
-        )
+        edges.append(FlatEdge(len(edges), self._label(begin, end), begin, end, options, via, segments))
 
     def _end(self, port: SourceEnd) -> End | None:
         found = self.ends.get(port)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-
-import msgspec
+from collections.abc import Iterable
 
 from hfg.errors import GraphError
 from hfg.graph.structure.fitting import need_fitting
+from hfg.graph.structure.given import node_options
 from hfg.graph.structure.level import Level, inside, level_of, nodes_within
 from hfg.graph.structure.membership import close_box, leave, open_box, settle
 from hfg.graph.structure.naming import need_name, path_of, suggest
-from hfg.graph.structure.options import NodeOptions, node_options
+from hfg.graph.structure.option import having
+from hfg.graph.structure.options import PLAIN_NODE, NodeGiven, NodeOptions
 from hfg.graph.structure.refusals import Refusable
 from hfg.graph.structure.subgraph import Box, is_box
 from hfg.nodetypes.node import Node
@@ -19,7 +19,7 @@ from hfg.nodetypes.node import Node
 __all__ = ["add"]
 
 
-def add(level: Level, node: Node, name: str | None, given: Mapping[str, object]) -> None:
+def add(level: Level, node: Node, name: str | None, given: NodeGiven) -> None:
     """Add a node; a subgraph builds its inside now.
 
     Args:
@@ -41,12 +41,8 @@ def add(level: Level, node: Node, name: str | None, given: Mapping[str, object])
             f'{level.title} has a node "{name}" already; choose another name, or leave name out for the next free one'
         )
     path = level.path_to(name)
-    unknown = next((one for one in given if one not in NodeOptions.__struct_fields__), None)
-    if unknown is not None:
-        raise GraphError(f'node "{path}": there is no option {unknown!r}; options are those of graph.add')
-    said = msgspec.structs.asdict(NodeOptions()) | dict(given)
-    said["iterate_over"] = _iterated_inputs(node, path, said["iterate_over"])
-    options = NodeOptions()
+    said = _with_iterated(node, path, given)
+    options = PLAIN_NODE
     with Refusable(path):
         options = node_options(f'node "{path}"', said)
         if options.iterate_over or not is_box(node):  # one that is dissolved is told more below
@@ -114,28 +110,29 @@ def _need_new(node: object) -> None:
         )
 
 
-def _iterated_inputs(node: Node, path: str, given: object) -> tuple[str, ...]:
-    """Give the names of the inputs that a subgraph iterates over, as said in `add` or else by its type (rule G4).
+def _with_iterated(node: Node, path: str, given: NodeGiven) -> NodeGiven:
+    """Return the options with the inputs that a subgraph iterates over, as said in `add` or else by its type (rule G4).
 
     Raises:
       GraphError: the node is no subgraph, or has no such input.
     """
-    if not isinstance(given, Iterable):
-        raise GraphError(f'node "{path}": iterate_over takes names of inputs, as in ("items",), got {given!r}')
-    names = (given,) if isinstance(given, str) else tuple(given)
+    said = given.get("iterate_over", ())
+    if not isinstance(said, Iterable):
+        raise GraphError(f'node "{path}": iterate_over takes names of inputs, as in ("items",), got {said!r}')
+    names = (said,) if isinstance(said, str) else tuple(said)
     if not is_box(node):
         if names:
             raise GraphError(
                 f'node "{path}": iterate_over is for subgraphs, got {names!r}; put it into an hfg.Subgraph'
             )
-        return ()
+        return given
     names = names or tuple(getattr(node, "iterate_over", ()))
     for name in names:
         if name not in node._type.inputs:
             raise GraphError(
                 f'subgraph "{path}": iterate_over names "{name}", which is no input; {suggest(name, node._type.inputs)}'
             )
-    return names
+    return {**given, "iterate_over": names} if names else given
 
 
 def _need_subgraph_options(node: Node, options: NodeOptions) -> None:
@@ -146,9 +143,8 @@ def _need_subgraph_options(node: Node, options: NodeOptions) -> None:
     """
     if options.iterate_over:
         return
-    fitting = NodeOptions(group=options.group, active_for_s=options.active_for_s, enabled=options.enabled)
-    for name in NodeOptions.__struct_fields__:
-        if getattr(options, name) != getattr(fitting, name):
+    for name in having(NodeOptions, ""):
+        if name in options.said():
             raise GraphError(
                 f'subgraph "{path_of(node)}": it does not fire itself, so {name} means nothing; '
                 "give it to the nodes inside, in build()"

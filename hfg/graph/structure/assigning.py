@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-
 from hfg.errors import GraphError
+from hfg.graph.structure.given import group_spec
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.membership import set_options
 from hfg.graph.structure.naming import path_of, suggest
-from hfg.graph.structure.options import GroupSpec, Policy, group_spec, in_group
+from hfg.graph.structure.options import GroupGiven, GroupSpec, in_group
 from hfg.graph.structure.pointing import meant, node_at
 from hfg.graph.structure.refusals import Refusable
 from hfg.nodetypes.node import Node
@@ -16,17 +15,7 @@ from hfg.nodetypes.node import Node
 __all__ = ["declare_group", "move"]
 
 
-def declare_group(
-    level: Level,
-    name: str,
-    threads: int | None,
-    policy: Policy,
-    seed: int | None,
-    process: bool = False,
-    host: str | None = None,
-    ledger: bool | str | os.PathLike[str] = False,
-    may_misalign: bool = False,
-) -> GroupSpec:
+def declare_group(level: Level, name: str, given: GroupGiven) -> GroupSpec:
     """Declare a group of the whole graph.
 
     Raises:
@@ -36,7 +25,7 @@ def declare_group(
     groups = level.whole.groups
     declared: GroupSpec | None = None
     with Refusable(name):
-        declared = group_spec(name, threads, policy, seed, process, host, ledger, may_misalign)
+        declared = group_spec(name, given)
         groups.declare(declared)
     # One that is refused while refusals are kept is there nevertheless, so that nodes in it are not refused as well.
     return declared if declared is not None else groups.by_name.setdefault(str(name), GroupSpec(str(name)))

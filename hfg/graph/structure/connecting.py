@@ -6,6 +6,7 @@ out to be synchronous) is found by the check. Stands on levels, edges, types and
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final, NoReturn
 
 from reactivex import Observable
@@ -13,8 +14,9 @@ from reactivex import Observable
 from hfg import errors
 from hfg.base.token import Token
 from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, TargetEnd, end_path, is_port, type_of
+from hfg.graph.structure.given import edge_options
 from hfg.graph.structure.level import Level, level_of
-from hfg.graph.structure.options import PLAIN, EdgeOptions, edge_options
+from hfg.graph.structure.options import PLAIN, EdgeGiven, EdgeOptions
 from hfg.graph.structure.pointing import source_at, target_at
 from hfg.graph.structure.refusals import Refusable
 from hfg.graph.structure.subgraph import is_box, iterated
@@ -28,7 +30,7 @@ __all__ = ["connect", "declare_edge", "refuse"]
 _SYNCHRONOUS: Final = ("output", "parameter")
 
 
-def connect(level: Level, source: SourceEnd | str, target: TargetEnd | str, said: dict[str, Any]) -> Edge:
+def connect(level: Level, source: SourceEnd | str, target: TargetEnd | str, said: EdgeGiven) -> Edge:
     """Declare an edge; see `Graph.connect`, whose options `said` holds by name.
 
     Raises:
@@ -57,7 +59,7 @@ def _level_for(level: Level, source: SourceEnd, target: TargetEnd) -> Level:
     return level_of(home)
 
 
-def declare_edge(level: Level, source: SourceEnd, target: TargetEnd, said: dict[str, Any]) -> Edge:
+def declare_edge(level: Level, source: SourceEnd, target: TargetEnd, said: Mapping[str, Any]) -> Edge:
     """Add an edge that may be to a level.
 
     Raises:
@@ -86,12 +88,11 @@ def refuse(level: Level, source: SourceEnd, target: TargetEnd, options: EdgeOpti
         _need_settable(source, target)
     if is_port(source):
         _need_types(source, target)
-    if options.active or options.for_events:
+    if options is not PLAIN:
         _need_right_options(source, target, options)
-    if options.initial:
-        _need_initial(source, target, options.initial)
-    if options.buffer:
-        _need_data(source, target, options.buffer)
+        if options.initial:
+            _need_initial(source, target, options.initial)
+        _need_data(source, target, options)
     if isinstance(target, InnerTarget):
         _need_same_manner(source, target)
     if is_box(target.node) or is_box(getattr(source, "node", None)):
@@ -228,7 +229,6 @@ def _need_settable(source: SourceEnd, target: TargetEnd) -> None:
 
 
 def _need_right_options(source: SourceEnd, target: TargetEnd, options: EdgeOptions) -> None:
-    said = options.for_events
     between = f'"{end_path(source)}" -> "{target.path}"'
     if options.active:
         if options.overflow != "wait":
@@ -241,6 +241,7 @@ def _need_right_options(source: SourceEnd, target: TargetEnd, options: EdgeOptio
                 f"{between}: operators may hold or drop signals, so the edge cannot be active; "
                 "leave out active=True, or the operators (rule P9)"
             )
+    said = options.first_said("events")
     if said is not None and isinstance(source, Port) and source.kind in _SYNCHRONOUS:
         event = "send by an event"
         if isinstance(source, OutputPort) and not is_box(source.node):
@@ -279,18 +280,21 @@ def _need_initial(source: SourceEnd, target: TargetEnd, initial: tuple[Any, ...]
             )
 
 
-def _need_data(source: SourceEnd, target: TargetEnd, buffer: int) -> None:
-    """Refuse a buffer on what is no edge from an output into an input; where a relay leads is for the check to see."""
+def _need_data(source: SourceEnd, target: TargetEnd, options: EdgeOptions) -> None:
+    """Refuse what only edges from outputs into inputs can have; where a relay leads is for the check to see."""
+    said = options.first_said("data")
+    if said is None:
+        return
     between = f'"{end_path(source)}" -> "{target.path}"'
     if not is_port(source) or source.kind == "event":
         raise errors.ConnectionError(
-            f"{between}: buffer={buffer} is for edges from outputs, and signals wait in a queue anyway; "
+            f"{between}: {said} is for edges from outputs, and signals wait in a queue anyway; "
             "say how long it is by capacity=... (rules P4, P5)"
         )
     is_relay = is_box(target.node) and target.name in target.node._type.slots
     if target.kind == "slot" and not is_relay:
         raise errors.ConnectionError(
-            f"{between}: buffer={buffer} is for edges into inputs; "
+            f"{between}: {said} is for edges into inputs; "
             "leave it out, or send by an event, whose edge has a queue (rules P4, F6)"
         )
 

@@ -1,442 +1,346 @@
-"""What is said about a node, an edge or a group besides its ends: frozen data, checked when it is given.
+"""The options of edges, nodes and groups. This is the place to add one.
 
-Equal options are one object: ten thousand nodes with nothing special share theirs. Stands on errors; knows neither
-nodes nor ports.
+Each is declared once, as a field with an `Option`: its type, default, limits, unit, meaning, who may have it and how a
+drawing shows it. What may be given in a call stands above it for type checkers, by name and type. Everything else is
+made of the declarations: commands, graph files and their schema, saving and loading, editing, grouping and cutting,
+labels in drawings, and the tables in docs/reference.md.
+
+Stands on `option`; knows neither nodes nor ports.
 """
 
 from __future__ import annotations
 
-import builtins
-import contextlib
 import functools
 import os
-import sys
-from collections.abc import Callable, Iterable
-from typing import Any, Final, Literal, TypeAlias, TypeGuard, TypeVar
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any, Final, Generic, Literal, TypeAlias, TypedDict
 
 import msgspec
+from typing_extensions import TypeVar
 
-from hfg import errors
-from hfg.base.controls import name_problem
-from hfg.errors import GraphError, HfgError
+from hfg.graph.structure.option import Fields, Option, documented
+from hfg.graph.structure.retrying import Errors
 
 __all__ = [
+    "ACTIVE",
+    "PLAIN",
+    "PLAIN_NODE",
+    "EdgeFields",
+    "EdgeGiven",
     "EdgeOptions",
     "Errors",
+    "GroupFields",
+    "GroupGiven",
     "GroupSpec",
+    "NodeFields",
+    "NodeGiven",
     "NodeOptions",
     "OnError",
     "Overflow",
     "Policy",
     "Release",
-    "edge_options",
-    "group_spec",
     "in_group",
-    "node_options",
 ]
 
 OnError: TypeAlias = Literal["stop", "skip", "disable", "restart"]
 Release: TypeAlias = Literal["auto", "sequential", "pipelined"]
-Errors: TypeAlias = "Iterable[type[Exception] | str] | type[Exception] | str"
 Overflow: TypeAlias = Literal["wait", "drop_oldest", "drop_newest", "latest", "error"]
 Policy: TypeAlias = Literal["fifo", "priority", "deadline", "fair", "random"]
 
-ON_ERROR: Final[tuple[OnError, ...]] = ("stop", "skip", "disable", "restart")
-RELEASE: Final[tuple[Release, ...]] = ("auto", "sequential", "pipelined")
-OVERFLOW: Final[tuple[Overflow, ...]] = ("wait", "drop_oldest", "drop_newest", "latest", "error")
-POLICY: Final[tuple[Policy, ...]] = ("fifo", "priority", "deadline", "fair", "random")
-DEFAULT_CAPACITY: Final = 16
+T = TypeVar("T", default=Any)
+O = TypeVar("O", default=Any)  # noqa: E741 - operators
 
-Options = TypeVar("Options")
+_LONGEST: Final = 40  # characters of an initial value in a drawing
 
 
-class NodeOptions(msgspec.Struct, frozen=True, kw_only=True):
-    """How a node runs; nothing of it belongs to its type.
-
-    Attributes:
-      group: where it runs; None is the group of the subgraph around it, at last "loop".
-      priority: higher first, in a group with policy "priority" (rule R2).
-      max_rate_hz: at most so many firings a second (rule F11).
-      on_error: what follows when its code fails (rule X1); the next two are for "restart".
-      max_duration_s: the time limit of a firing, and of each attempt at it (rule X2).
-      retries: how often a firing that fails is tried again before `on_error` says what follows (rule X1).
-      retry_on: names of the errors that are tried again, "ConnectionError" or "my_robot.nodes:NoAnswer"; () is all.
-      retry_backoff_s: the pause before the first of them; each further one is twice as long.
-      retry_backoff_max_s: no pause is longer.
-      retry_jitter: by which part of it a pause may be shorter, by chance: from 0, never, to 1.
-      concurrency: how many firings may be under way at once (rule F14).
-      ordered: with concurrency: outputs leave in the order in which the firings began, not as they are over.
-      release: when the tokens it takes count as processed (rule F5).
-      active_for_s: `timeout` is triggered after so long an activity (rule A12).
-      deadline_s: how old the oldest token it takes may become, in a group with policy "deadline" (rule R2).
-      enabled: whether it is at the start of a run.
-      iterate_over: names of a subgraph's inputs that take collections (rule G4).
-    """
-
-    group: str | None = None
-    priority: int = 0
-    max_rate_hz: float | None = None
-    on_error: OnError = "stop"
-    restart_limit: int = 5
-    restart_backoff_s: float = 0.1
-    max_duration_s: float | None = None
-    retries: int = 0
-    retry_on: tuple[str, ...] = ()
-    retry_backoff_s: float = 0.1
-    retry_backoff_max_s: float = 30.0
-    retry_jitter: float = 0.0
-    concurrency: int = 1
-    ordered: bool = True
-    release: Release = "auto"
-    active_for_s: float | None = None
-    deadline_s: float | None = None
-    enabled: bool = True
-    iterate_over: tuple[str, ...] = ()
+# --- edges ---
 
 
-class EdgeOptions(msgspec.Struct, frozen=True, kw_only=True):
-    """How an edge transports; all but `active`, `initial` and `buffer` are for event edges (rules P4, P5).
+class EdgeGiven(TypedDict, Generic[T, O], total=False):
+    """What may be said of an edge, with initial values of type T and operators of type O."""
 
-    Attributes:
-      active: it also transports activity: the double line of the paper, A(e) = 1.
-      capacity: how many untaken signals its queue holds.
-      overflow: what happens to more of them; "wait" loses none (rule F8).
-      capacity_limit: how far "wait" may let the queue grow; None without end.
-      through: reactivex operators before the queue (rule P9).
-      initial: values that lie on it at the start (rule P7).
-      buffer: of an edge from an output into an input: by how many tokens the producer may run ahead (rule P4).
-    """
-
-    active: bool = False
-    capacity: int = DEFAULT_CAPACITY
-    overflow: Overflow = "wait"
-    capacity_limit: int | None = None
-    through: tuple[Any, ...] = ()
-    initial: tuple[Any, ...] = ()
-    buffer: int = 0
-
-    @property
-    def for_events(self) -> str | None:
-        """The first thing said that only an event edge can have, as written in the call; None if there is none."""
-        if self.through:
-            return "through=[...]"
-        if self.overflow != "wait":
-            return f'overflow="{self.overflow}"'
-        if self.capacity != DEFAULT_CAPACITY:
-            return f"capacity={self.capacity}"
-        return None if self.capacity_limit is None else f"capacity_limit={self.capacity_limit}"
+    active: bool
+    capacity: int
+    overflow: Overflow
+    capacity_limit: int | None
+    buffer: int
+    initial: Iterable[T]
+    through: Iterable[O]
 
 
-class GroupSpec(msgspec.Struct, frozen=True):
-    """Where nodes run, and who of them comes first (rules R1, R2).
+def _values(values: Sequence[object]) -> str:
+    texts = [repr(value) for value in values[:4]]
+    text = ", ".join(one if len(one) <= _LONGEST else f"{one[: _LONGEST - 1]}…" for one in texts)
+    return f"initial {text}" + (f" and {len(values) - 4} more" if len(values) > 4 else "")
 
-    Attributes:
-      threads: 0 is the event loop, 1 a thread of the group's own; with n of them n of its nodes run at once.
-      policy: who runs next when several can.
-      seed: for "random"; None is the run's.
-      process: its nodes run in a process of its own, on the loop or the threads there.
-      host: of that process; "" is the one where the graph is run.
-      ledger: what its process has done is kept, so that another goes on from there: True by the run, a path in that
-        file, too.
-      may_misalign: the run goes on when that process dies, though joins may pair what does not belong together (L2).
-    """
+
+def _count(operators: Sequence[object]) -> str:
+    return "1 operator" if len(operators) == 1 else f"{len(operators)} operators"
+
+
+class EdgeFields(Fields, kw_only=True):
+    """How an edge transports."""
+
+    active: Annotated[bool, Option("It also transports activity, the double line of the paper.", border="every")] = (
+        False
+    )
+    capacity: Annotated[
+        int, Option("How many untaken signals its queue holds (rule P5).", least=1, only="events", badge="capacity {}")
+    ] = 16
+    overflow: Annotated[
+        Overflow,
+        Option('What happens to more of them; "wait" loses none (rules P5, F8).', only="events", badge="{}", rank=-1),
+    ] = "wait"
+    capacity_limit: Annotated[
+        int | None,
+        Option('How far "wait" may let the queue grow (rule F8).', least=1, only="events", badge="at most {}"),
+    ] = None
+    buffer: Annotated[
+        int,
+        Option(
+            "By how many tokens the producer may run ahead (rule P4).",
+            least=0,
+            only="data",
+            border="sum",
+            badge="buffer {}",
+            rank=1,
+        ),
+    ] = 0
+    initial: Annotated[
+        tuple[Any, ...],
+        Option(
+            "Values on it at the start, the oldest first (rule P7).",
+            expects="[0]",
+            border="target",
+            badge=_values,
+            rank=1,
+        ),
+    ] = ()
+    through: Annotated[
+        tuple[Any, ...],
+        Option(
+            "Reactivex operators before the queue (rule P9).",
+            expects="[ops.debounce(0.2)]",
+            only="events",
+            border="along",
+            badge=_count,
+        ),
+    ] = ()
+
+    def said(self) -> dict[str, Any]:
+        """Return the options that have other values than their defaults, by name."""
+        found = super().said()
+        if self.overflow == "latest":
+            found.pop("capacity", None)  # it is 1 by that
+        return found
+
+
+@documented
+class EdgeOptions(EdgeFields, frozen=True):  # type: ignore[misc]  # the same fields, which nobody changes any more
+    """How an edge transports, checked."""
+
+
+# --- nodes ---
+
+
+class NodeGiven(TypedDict, total=False):
+    """What may be said of a node."""
+
+    group: str | None
+    priority: int
+    max_rate_hz: float | None
+    on_error: OnError
+    restart_limit: int
+    restart_backoff_s: float
+    max_duration_s: float | None
+    retries: int
+    retry_on: Errors
+    retry_backoff_s: float
+    retry_backoff_max_s: float
+    retry_jitter: float
+    concurrency: int
+    ordered: bool
+    release: Release
+    active_for_s: float | None
+    deadline_s: float | None
+    enabled: bool
+    iterate_over: Iterable[str]
+
+
+def _each(names: Sequence[str]) -> str:
+    return f"for each of {', '.join(names)}"
+
+
+class NodeFields(Fields, kw_only=True):
+    """How a node runs; nothing of it belongs to its type."""
+
+    group: Annotated[
+        str | None,
+        Option(
+            "Where it runs, as declared with `graph.group`; by default where the subgraph around it does, else on the "
+            "loop.",
+            expects="the name of a group",
+            remedy='declare it with graph.group("vision", threads=1)',
+            only="any",
+        ),
+    ] = None
+    priority: Annotated[int, Option('Higher first, in a group with policy "priority" (rule R2).')] = 0
+    max_rate_hz: Annotated[
+        float | None, Option("At most so many firings per second (rule F11).", above=0, badge="{:g} Hz")
+    ] = None
+    on_error: Annotated[OnError, Option("What follows when its code fails (rule X1).")] = "stop"
+    restart_limit: Annotated[int, Option('For "restart": how often.', least=0)] = 5
+    restart_backoff_s: Annotated[
+        float, Option('For "restart": the first pause.', least=0, remedy="0 restarts at once")
+    ] = 0.1
+    max_duration_s: Annotated[
+        float | None, Option("The time limit of a firing, and of each attempt at it (rule X2).", above=0)
+    ] = None
+    retries: Annotated[
+        int, Option("How often a firing that fails is tried again, before `on_error` applies (rule X1).", least=0)
+    ] = 0
+    retry_on: Annotated[
+        tuple[str, ...],
+        Option(
+            "Only these errors, and those derived from them, are tried again: classes or their names, "
+            '"ConnectionError", "my_robot.nodes:NoAnswer"; by default all are.',
+            expects="[ConnectionError]",
+        ),
+    ] = ()
+    retry_backoff_s: Annotated[
+        float,
+        Option(
+            "The pause before the first retry; each further pause is twice as long.",
+            least=0,
+            remedy="0 tries again at once",
+        ),
+    ] = 0.1
+    retry_backoff_max_s: Annotated[float, Option("No pause is longer.", least=0, remedy="0 makes no pause at all")] = (
+        30.0
+    )
+    retry_jitter: Annotated[
+        float,
+        Option(
+            "By which part a pause may be shorter, at random.",
+            least=0,
+            most=1,
+            remedy="0.5 makes pauses up to a half shorter",
+        ),
+    ] = 0.0
+    concurrency: Annotated[
+        int,
+        Option(
+            "How many firings of it may be under way at once: of an async function, or in a group with as many threads "
+            "(rule F14).",
+            least=1,
+        ),
+    ] = 1
+    ordered: Annotated[bool, Option("With concurrency: outputs leave in the order in which the firings began.")] = True
+    release: Annotated[Release, Option("When the tokens it takes count as processed (rule F5).")] = "auto"
+    active_for_s: Annotated[
+        float | None,
+        Option(
+            "How long it may stay active before its `timeout` (rule A12).",
+            above=0,
+            badge="active for {:g} s",
+            only="any",
+        ),
+    ] = None
+    deadline_s: Annotated[
+        float | None,
+        Option('How old the oldest token it takes may become, in a group with policy "deadline" (rule R2).', above=0),
+    ] = None
+    enabled: Annotated[bool, Option("It is enabled when a run starts.", badge="disabled", only="any")] = True
+    iterate_over: Annotated[
+        tuple[str, ...],
+        Option("The inputs that take collections (rule G4).", expects='["items"]', only="subgraph", badge=_each),
+    ] = ()
+
+
+@documented
+class NodeOptions(NodeFields, frozen=True):  # type: ignore[misc]  # the same fields, which nobody changes any more
+    """How a node runs, checked."""
+
+
+# --- groups ---
+
+
+class GroupGiven(TypedDict, total=False):
+    """What may be said of a group; None is nothing said."""
+
+    threads: int | None
+    policy: Policy
+    seed: int | None
+    process: bool
+    host: str | None
+    ledger: bool | str | os.PathLike[str]
+    may_misalign: bool
+
+
+class GroupFields(Fields, kw_only=True):
+    """Where nodes run, and which of them comes first (rules R1, R2)."""
+
+    threads: Annotated[
+        int,
+        Option(
+            "Where its nodes run: n of them at once with n threads.",
+            usual="1; 0 where there is a process",
+            least=0,
+            expects="0 (on the loop), 1 (a thread of its own) or the number of its threads",
+            remedy="with n threads up to n of its nodes run at the same time",
+        ),
+    ] = 0
+    policy: Annotated[Policy, Option("Who is first when several can run (rule R2).")] = "fifo"
+    seed: Annotated[
+        int | None, Option('For policy "random"; by default that of the run.', expects="a whole number")
+    ] = None
+    process: Annotated[
+        bool,
+        Option(
+            "It has a process of its own; edges to and from its nodes become links (rule L1).",
+            remedy="host= names another host than this",
+        ),
+    ] = False
+    host: Annotated[
+        str,
+        Option(
+            'The agent that is to run that process, as in host="arm"; it implies `process`.',
+            expects='the name of an agent, as in host="arm"',
+            fits=lambda host: "/" not in host,
+        ),
+    ] = ""
+    ledger: Annotated[
+        bool | str,
+        Option(
+            "What the process has done, its `hfg.State` and its places on all edges are kept together, so that another "
+            "goes on from there when it dies, with nothing lost or doubled: by the run, or in a file that the next run "
+            "goes on from, too.",
+            expects='True (kept by the run) or the path of a file, as in ledger="writer.ledger"',
+        ),
+    ] = False
+    may_misalign: Annotated[
+        bool,
+        Option(
+            "The run goes on when that process dies although nobody can know how many tokens are lost with it and a "
+            "join behind it may pair what does not belong together; else it fails then (rule L2). `hfg check` says "
+            "where that is so."
+        ),
+    ] = False
+
+
+@documented
+class GroupSpec(GroupFields, frozen=True):  # type: ignore[misc]
+    """Where nodes run, and which of them comes first (rules R1, R2), checked."""
 
     name: str
-    threads: int = 0
-    policy: Policy = "fifo"
-    seed: int | None = None
-    process: bool = False
-    host: str = ""
-    ledger: bool | str = False
-    may_misalign: bool = False
 
 
-_PAUSES: Final = {
-    "restart_backoff_s": "0 restarts at once",
-    "retry_backoff_s": "0 tries again at once",
-    "retry_backoff_max_s": "0 makes no pause at all",
-}
 PLAIN: Final = EdgeOptions()
 ACTIVE: Final = EdgeOptions(active=True)
-
-
-def node_options(where: str, given: dict[str, Any]) -> NodeOptions:
-    """Check the options of a node and give the object shared by all that have the same, which are checked once.
-
-    Raises:
-      GraphError: a value is out of its range; the message begins with `where`.
-    """
-    given["retry_on"] = _error_names(where, given["retry_on"], retries=given["retries"])
-    with contextlib.suppress(GraphError, TypeError):  # the second: one that cannot be hashed, and so is none
-        return _right_options(**given)
-    return _checked(where, given)  # which refuses them in the name of the node
-
-
-@functools.lru_cache(maxsize=1024, typed=True)
-def _right_options(**given: Any) -> NodeOptions:  # noqa: ANN401 - each checked by its name
-    return _checked("", given)
-
-
-def _checked(where: str, given: dict[str, Any]) -> NodeOptions:
-    _need_choice(where, "on_error", given["on_error"], ON_ERROR, GraphError)
-    _need_choice(where, "release", given["release"], RELEASE, GraphError)
-    for name in ("max_rate_hz", "max_duration_s", "active_for_s", "deadline_s"):
-        _need_positive(where, name, given[name])
-    for name, least in (("priority", None), ("restart_limit", 0), ("retries", 0), ("concurrency", 1)):
-        _need_whole(where, name, given[name], least, GraphError)
-    _need_pauses(where, given)
-    for name in ("enabled", "ordered"):
-        if type(given[name]) is not bool:
-            raise GraphError(f"{where}: {name} must be True or False, got {given[name]!r}")
-    group = given["group"]
-    if group is not None and (type(group) is not str or not group):
-        raise GraphError(
-            f"{where}: group must be the name of a group, got {group!r}; "
-            'declare it with graph.group("vision", threads=1)'
-        )
-    return NodeOptions(**given)
-
-
-def _error_names(where: str, given: object, *, retries: object) -> tuple[str, ...]:
-    """Give the names of errors, which may be given as classes or by name; nothing is imported for them.
-
-    A name is compared with those of the error that was raised and of its bases, so one of a module that is not loaded
-    does no harm, and a graph file brings no code with it.
-
-    Raises:
-      GraphError: one of them is not an error, or nothing is tried again at all; the message begins with `where`.
-    """
-    if isinstance(given, str | type):
-        given = (given,)
-    if not isinstance(given, Iterable):
-        raise GraphError(f"{where}: retry_on takes errors, as in retry_on=(ConnectionError,), got {given!r}")
-    names = tuple(_error_name(where, error) for error in given)
-    if names and not retries:
-        raise GraphError(
-            f"{where}: retry_on=({', '.join(names)},) says which errors are tried again, and retries=0 tries none; "
-            "add retries=3"
-        )
-    return names
-
-
-def _error_name(where: str, error: object) -> str:
-    """Name one error; what has no module in its name is built in."""
-    if isinstance(error, str):
-        module, _, name = error.rpartition(":")
-        if module and module not in sys.modules:
-            return error  # what raises it brings its module, and until then nothing can
-        found: Any = sys.modules[module] if module else builtins
-        for part in name.split("."):
-            found = getattr(found, "__dict__", {}).get(part)  # which runs no code, as getattr might
-        if found is None:
-            raise GraphError(
-                f'{where}: retry_on names "{error}", and there is no such error; built-in ones are written '
-                '"ConnectionError", others with their module, "my_robot.nodes:NoAnswer"'
-            )
-    else:
-        found = error
-    if not isinstance(found, type) or not issubclass(found, Exception):
-        raise GraphError(
-            f"{where}: retry_on takes classes of errors, as in retry_on=(ConnectionError,), got {error!r}, which is "
-            "none" + (": what ends a task or the program on purpose is not tried again" if _is_exit(found) else "")
-        )
-    return found.__qualname__ if found.__module__ == "builtins" else f"{found.__module__}:{found.__qualname__}"
-
-
-def _is_exit(found: object) -> bool:
-    return isinstance(found, type) and issubclass(found, BaseException)
-
-
-def _need_pauses(where: str, given: dict[str, Any]) -> None:
-    for name, what in _PAUSES.items():
-        if not _is_number(given[name]) or given[name] < 0:
-            raise GraphError(f"{where}: {name} must be seconds from 0 on, got {given[name]!r}; {what}")
-    jitter = given["retry_jitter"]
-    if not _is_number(jitter) or not 0 <= jitter <= 1:
-        raise GraphError(
-            f"{where}: retry_jitter must be a number from 0 to 1, got {jitter!r}; 0.5 makes pauses up to a half shorter"
-        )
+PLAIN_NODE: Final = NodeOptions()
 
 
 @functools.lru_cache(maxsize=1024)
 def in_group(options: NodeOptions, group: str | None) -> NodeOptions:
-    """The same options in another group, or in that of the subgraph around."""
+    """Return the same options in another group, or in that of the subgraph around."""
     return msgspec.structs.replace(options, group=group)
-
-
-def edge_options(where: Callable[[], str], said: dict[str, Any]) -> EdgeOptions:
-    """Check the options of an edge, given by name; plain edges share one object, plain active ones another.
-
-    Raises:
-      ConnectionError: a value is out of its range, or the options contradict each other; the message begins with what
-        `where` gives.
-    """
-    said["through"] = through = _listed(where, "through", said["through"], "[ops.debounce(0.2)]")
-    said["initial"] = initial = _listed(where, "initial", said["initial"], "[0]")
-    if (
-        not through
-        and not initial
-        and said["capacity_limit"] is None
-        and said["overflow"] == "wait"
-        and said["capacity"] == DEFAULT_CAPACITY
-        and type(said["buffer"]) is int
-        and said["buffer"] == 0
-        and type(said["active"]) is bool
-    ):
-        return ACTIVE if said["active"] else PLAIN
-    at = where()
-    if type(said["active"]) is not bool:
-        raise errors.ConnectionError(f"{at}: active must be True or False, got {said['active']!r}")
-    _need_queue(at, said)
-    _need_whole(at, "buffer", said["buffer"], 0, errors.ConnectionError)
-    broken = next((operator for operator in through if not callable(operator)), None)
-    if broken is not None:
-        raise errors.ConnectionError(
-            f"{at}: through takes reactivex operators such as ops.debounce(0.2), got {broken!r}"
-        )
-    return EdgeOptions(**said)
-
-
-def _need_queue(at: str, said: dict[str, Any]) -> None:
-    """Check what is said about the queue of an event edge; "latest" means a capacity of 1 (rule P5)."""
-    capacity, overflow, limit = said["capacity"], said["overflow"], said["capacity_limit"]
-    _need_choice(at, "overflow", overflow, OVERFLOW, errors.ConnectionError)
-    _need_whole(at, "capacity", capacity, 1, errors.ConnectionError)
-    if overflow == "latest":
-        if capacity not in (1, DEFAULT_CAPACITY):
-            raise errors.ConnectionError(
-                f'{at}: overflow="latest" keeps one signal, got capacity={capacity}; '
-                'leave capacity out, or use overflow="drop_oldest"'
-            )
-        said["capacity"] = 1
-    if limit is None:
-        return
-    _need_whole(at, "capacity_limit", limit, said["capacity"], errors.ConnectionError)
-    if overflow != "wait":
-        raise errors.ConnectionError(
-            f'{at}: capacity_limit bounds how far overflow="wait" may grow, '
-            f'got overflow="{overflow}", which never grows; leave one of them out'
-        )
-
-
-def _listed(where: Callable[[], str], name: str, given: object, example: str) -> tuple[Any, ...]:
-    """Several things, in order; one alone is the likely slip."""
-    if type(given) is tuple:
-        return given
-    if not isinstance(given, Iterable) or isinstance(given, str):
-        raise errors.ConnectionError(f"{where()}: {name} takes a list, as in {name}={example}, got {given!r}")
-    return tuple(given)
-
-
-def group_spec(
-    name: str,
-    threads: int | None,
-    policy: str,
-    seed: int | None,
-    process: bool = False,
-    host: str | None = None,
-    ledger: bool | str | os.PathLike[str] = False,
-    may_misalign: bool = False,
-) -> GroupSpec:
-    """Check a group.
-
-    Args:
-      name: of the group.
-      threads: None is one, but none for "loop" and for a group with a process of its own.
-      policy: who runs next.
-      seed: for "random".
-      process: whether it has a process of its own.
-      host: where that is; whoever names one asks for a process.
-      ledger: whether what that has done is kept, or in which file.
-      may_misalign: whether the run goes on behind a death that may misalign joins.
-
-    Raises:
-      GraphError: a value is out of its range.
-    """
-    if type(name) is not str or not name:
-        raise GraphError(f"a group needs a name, got {name!r}")
-    problem = name_problem(name)
-    if problem is not None:
-        raise GraphError(f"a group {problem}")
-    at = f'group "{name}"'
-    host = "" if host is None else host
-    _need_place(at, process, host)
-    process = process or bool(host)
-    if threads is None:
-        threads = 0 if process or name == "loop" else 1
-    _need_threads(at, threads)
-    if name == "loop":
-        _need_nothing_own(at, threads, process)
-    ledger = os.fspath(ledger) if isinstance(ledger, os.PathLike) else ledger
-    _need_ledger(at, ledger, process)
-    _need_process_for(at, may_misalign, process)
-    _need_choice(at, "policy", policy, POLICY, GraphError)
-    if seed is not None:
-        _need_whole(at, "seed", seed, None, GraphError)
-    return GroupSpec(name, threads, policy, seed, process, host, ledger, may_misalign)  # type: ignore[arg-type]  # checked above
-
-
-def _need_place(at: str, process: object, host: object) -> None:
-    if type(process) is not bool:
-        raise GraphError(f"{at}: process must be True or False, got {process!r}; host= names another host than this")
-    if type(host) is not str or "/" in host:
-        raise GraphError(f'{at}: host must be the name of an agent, as in host="arm", got {host!r}')
-
-
-def _need_threads(at: str, threads: object) -> None:
-    if type(threads) is not int or threads < 0:
-        raise GraphError(
-            f"{at}: threads must be 0 (on the loop), 1 (a thread of its own) or the number of its threads, "
-            f"got {threads!r}; with n threads up to n of its nodes run at the same time"
-        )
-
-
-def _need_nothing_own(at: str, threads: int, process: bool) -> None:
-    if threads:
-        raise GraphError(
-            f'{at}: it is the event loop itself and takes no thread; declare another, graph.group("work", threads=1)'
-        )
-    if process:
-        raise GraphError(
-            f'{at}: it is the event loop of the program itself; declare another, graph.group("vision", process=True)'
-        )
-
-
-def _need_process_for(at: str, may_misalign: object, process: bool) -> None:
-    if type(may_misalign) is not bool or (may_misalign and not process):
-        raise GraphError(
-            f"{at}: may_misalign says what follows from the death of the group's process: True or False, and with "
-            f"process=True; got {may_misalign!r}"
-        )
-
-
-def _need_ledger(at: str, ledger: object, process: bool) -> None:
-    if type(ledger) is not bool and (type(ledger) is not str or not ledger):
-        raise GraphError(
-            f'{at}: ledger must be True (kept by the run) or the path of a file, as in ledger="writer.ledger", '
-            f"got {ledger!r}"
-        )
-    if ledger and not process:
-        raise GraphError(f"{at}: ledger= keeps what a process has done, and this group has none; add process=True")
-
-
-def _is_number(value: object) -> TypeGuard[int | float]:
-    return isinstance(value, int | float) and type(value) is not bool and value == value  # NaN is none
-
-
-def _need_choice(where: str, name: str, value: object, choices: tuple[str, ...], error: type[HfgError]) -> None:
-    if value not in choices:
-        words = ", ".join(f'"{choice}"' for choice in choices)
-        raise error(f"{where}: {name} must be one of {words}, got {value!r}")
-
-
-def _need_whole(where: str, name: str, value: object, least: int | None, error: type[HfgError]) -> None:
-    if type(value) is not int or (least is not None and value < least):
-        raise error(
-            f"{where}: {name} must be a whole number{'' if least is None else f' from {least} on'}, got {value!r}"
-        )
-
-
-def _need_positive(where: str, name: str, value: object) -> None:
-    if value is not None and (not _is_number(value) or value <= 0):
-        raise GraphError(f"{where}: {name} must be a number above 0, or None for no limit, got {value!r}")

@@ -188,7 +188,7 @@ def _why_uncertain(whole: _Whole, flat: FlatGraph, nodes: list[FlatNode], touchi
         if not node.options.enabled or node.options.on_error == "disable" or node.index in switched:
             return f'"{node.path}" may be disabled while it runs'
     for edge in touching:
-        if not edge.is_event_edge or edge.target.kind != "input" or edge.overflow not in ("wait", "error"):
+        if not edge.is_event_edge or edge.target.kind != "input" or edge.options.overflow not in ("wait", "error"):
             continue
         target = whole.key_of(part, edge, source=False)
         if edge.source.node >= 0 and target is not None and whole.inputs.get(target, 0) > 1:
@@ -220,7 +220,7 @@ class _Whole:
     def __init__(self, cutting: Cutting, kept: Collection[str]) -> None:
         self.cutting = cutting
         self.kept = kept
-        has_initial = any(edge.initial for flat in cutting.parts.values() for edge in flat.edges)
+        has_initial = any(edge.options.initial for flat in cutting.parts.values() for edge in flat.edges)
         self.why_nothing_is_inherited = (
             "another group has a ledger" if kept else "some edge has initial values" if has_initial else ""
         )

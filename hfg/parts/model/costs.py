@@ -65,7 +65,7 @@ def _lost_work(nodes: Mapping[int, FlatNode]) -> Iterator[str]:
 def _lost_tokens(flat: FlatGraph, nodes: Collection[int]) -> Iterator[str]:
     own = (edge for edge in flat.edges if edge.source.node in nodes)
     inside = [edge for edge in own if edge.is_event_edge or edge.target.node != LINK]  # each of the others is counted
-    if tokens := sum(edge.capacity if edge.is_event_edge else 1 + edge.buffer for edge in inside):
+    if tokens := sum(edge.options.capacity if edge.is_event_edge else 1 + edge.options.buffer for edge in inside):
         of_what = "on its own edges, signals not sent yet among them, were lost with it; more if queues had grown"
         yield f"up to {_many(tokens, 'token', 'tokens')} {of_what}"
 

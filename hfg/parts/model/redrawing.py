@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import msgspec
+
 from hfg.errors import UsageError
 from hfg.graph.editing.changes import Change, ParameterChange
 from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatEdge, FlatGraph, FlatNode
@@ -150,8 +152,8 @@ def _name(flat: FlatGraph, end: int) -> str:
 
 def _edge(edge: FlatEdge) -> tuple[Any, ...]:
     segments = tuple(map(id, edge.segments))
-    held = (edge.active, edge.capacity, edge.overflow, edge.capacity_limit, edge.buffer)
-    return edge.label, segments, held, tuple(map(id, edge.through)), tuple(map(id, edge.initial))
+    held = msgspec.structs.replace(edge.options, through=(), initial=())
+    return edge.label, segments, held, tuple(map(id, edge.options.through)), tuple(map(id, edge.options.initial))
 
 
 def _link(edge: CutEdge) -> tuple[Any, ...]:

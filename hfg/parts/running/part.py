@@ -180,7 +180,7 @@ class Part:
 
     def _make_progresses(self, edges: list[CutEdge], components: Iterable[Component]) -> Iterator[Progress]:
         """One for each component, and one for each other edge from an output that comes in: into a slot."""
-        delays = {edge.label: len(edge.edge.initial) for edge in edges}
+        delays = {edge.label: len(edge.edge.options.initial) for edge in edges}
         into = {edge.label for edge in edges if edge.target == self.name and is_synchronous(edge)}
         for one in components if self.keeper is None else ():
             inherits = self.inherits and one.answers

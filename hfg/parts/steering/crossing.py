@@ -56,7 +56,7 @@ class Crossing:
         self._ports: dict[str, Port] = {}
         for one in flat.walk():
             for edge in one.edges:
-                is_made_over = bool(edge.through) or edge.source.kind == "observable"
+                is_made_over = bool(edge.options.through) or edge.source.kind == "observable"
                 self._ports[edge.label] = (edge.target if is_made_over else edge.source).port
         self._codecs: dict[str, TokenCodec[Any] | None] = {}
 
