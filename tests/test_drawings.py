@@ -17,6 +17,8 @@ from typing import Any, Protocol
 
 import pytest
 
+from tools.build_docs import DIAGRAMS, diagram_name, diagrams
+
 ROOT = Path(__file__).resolve().parent.parent
 COMMENT = r"<!-- drawing: (?P<target>\S+)(?P<options>[^\n]*) -->\n"
 IN_PAGE = re.compile(COMMENT + r"```mermaid\n(?P<text>.*?)```", re.DOTALL)
@@ -83,7 +85,8 @@ def test_no_drawing_is_left_over() -> None:
         for page in PAGES
         for match in IN_FILE.finditer(page.read_text(encoding="utf-8"))
     }
-    assert set((ROOT / "docs").rglob("*.svg")) == shown
+    names = {f"{diagram_name(source)}.{variant}.svg" for source in diagrams() for variant in ("light", "dark")}
+    assert set((ROOT / "docs").rglob("*.svg")) == shown | {ROOT / "docs" / DIAGRAMS / name for name in names}
 
 
 def test_every_figure_has_its_place() -> None:
