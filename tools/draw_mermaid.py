@@ -49,8 +49,8 @@ def draw(source: str, theme: str, folder: Path, browser: str) -> str:
     found = re.search(r"<svg.*</svg>", shown.stdout, re.S)
     if found is None:
         sys.exit(f"Mermaid could not draw this diagram:\n{source}\n{shown.stdout[-500:]}")
-    svg = found[0].replace("<br>", "<br/>")
-    return re.sub(r'width="100%"', "", svg, count=1) + "\n"
+    svg = found[0].replace("<br>", "<br/>").replace('width="100%"', "", 1)
+    return re.sub(r'viewBox="\S+ \S+ (\d+)\S* (\d+)[^"]*"', r'\g<0> width="\1" height="\2"', svg, count=1) + "\n"
 
 
 def main() -> None:
