@@ -14,9 +14,9 @@ PAGE: Final = Path(__file__).parents[2] / "docs" / "reference.md"
 _ONLY: Final = {
     "": "",
     "events": "Only on edges from events.",
-    "data": "Only on edges from outputs into inputs.",
+    "data": "Only on edges from outputs to inputs.",
     "any": "",
-    "subgraph": "Only of subgraphs.",
+    "subgraph": "Only for subgraphs.",
 }
 KINDS: Final[dict[str, type[Fields]]] = {"an edge": EdgeOptions, "a node": NodeOptions, "a group": GroupSpec}
 

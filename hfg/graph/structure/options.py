@@ -57,7 +57,7 @@ _LONGEST: Final = 40  # characters of an initial value in a drawing
 
 
 class EdgeGiven(TypedDict, Generic[T, O], total=False):
-    """What may be said of an edge, with initial values of type T and operators of type O."""
+    """The options of an edge, with initial values of type T and operators of type O."""
 
     active: bool
     capacity: int
@@ -81,24 +81,34 @@ def _count(operators: Sequence[object]) -> str:
 class EdgeFields(Fields, kw_only=True):
     """How an edge transports."""
 
-    active: Annotated[bool, Option("It also transports activity, the double line of the paper.", border="every")] = (
+    active: Annotated[bool, Option("The edge also carries activity (a double line in drawings).", border="every")] = (
         False
     )
     capacity: Annotated[
-        int, Option("How many untaken signals its queue holds (rule P5).", least=1, only="events", badge="capacity {}")
+        int,
+        Option(
+            "Maximum number of untaken signals in the queue (rule P5).", least=1, only="events", badge="capacity {}"
+        ),
     ] = 16
     overflow: Annotated[
         Overflow,
-        Option('What happens to more of them; "wait" loses none (rules P5, F8).', only="events", badge="{}", rank=-1),
+        Option(
+            'What to do when the queue is full; "wait" loses nothing (rules P5, F8).',
+            only="events",
+            badge="{}",
+            rank=-1,
+        ),
     ] = "wait"
     capacity_limit: Annotated[
         int | None,
-        Option('How far "wait" may let the queue grow (rule F8).', least=1, only="events", badge="at most {}"),
+        Option(
+            'The size up to which "wait" may let the queue grow (rule F8).', least=1, only="events", badge="at most {}"
+        ),
     ] = None
     buffer: Annotated[
         int,
         Option(
-            "By how many tokens the producer may run ahead (rule P4).",
+            "How many tokens the producer may run ahead (rule P4).",
             least=0,
             only="data",
             border="sum",
@@ -109,7 +119,7 @@ class EdgeFields(Fields, kw_only=True):
     initial: Annotated[
         tuple[Any, ...],
         Option(
-            "Values on it at the start, the oldest first (rule P7).",
+            "Values that are on the edge at the start, oldest first (rule P7).",
             expects="[0]",
             border="target",
             badge=_values,
@@ -144,7 +154,7 @@ class EdgeOptions(EdgeFields, frozen=True):  # type: ignore[misc]  # the same fi
 
 
 class NodeGiven(TypedDict, total=False):
-    """What may be said of a node."""
+    """The options of a node."""
 
     group: str | None
     priority: int
@@ -177,19 +187,21 @@ class NodeFields(Fields, kw_only=True):
     group: Annotated[
         str | None,
         Option(
-            "Where it runs, as declared with `graph.group`; by default where the subgraph around it does, else on the "
-            "loop.",
+            "The group in which the node runs, declared with `graph.group`; by default that of the surrounding "
+            "subgraph, or else the loop.",
             expects="the name of a group",
             remedy='declare it with graph.group("vision", threads=1)',
             only="any",
         ),
     ] = None
-    priority: Annotated[int, Option('Higher first, in a group with policy "priority" (rule R2).')] = 0
+    priority: Annotated[
+        int, Option('Nodes with a higher priority run first, in a group with policy "priority" (rule R2).')
+    ] = 0
     max_rate_hz: Annotated[
-        float | None, Option("At most so many firings per second (rule F11).", above=0, badge="{:g} Hz")
+        float | None, Option("Maximum number of firings per second (rule F11).", above=0, badge="{:g} Hz")
     ] = None
-    on_error: Annotated[OnError, Option("What follows when its code fails (rule X1).")] = "stop"
-    restart_limit: Annotated[int, Option('For "restart": how often.', least=0)] = 5
+    on_error: Annotated[OnError, Option("What to do when the node's code fails (rule X1).")] = "stop"
+    restart_limit: Annotated[int, Option('For "restart": the maximum number of restarts.', least=0)] = 5
     restart_backoff_s: Annotated[
         float, Option('For "restart": the first pause.', least=0, remedy="0 restarts at once")
     ] = 0.1
@@ -197,31 +209,31 @@ class NodeFields(Fields, kw_only=True):
         float | None, Option("The time limit of a firing, and of each attempt at it (rule X2).", above=0)
     ] = None
     retries: Annotated[
-        int, Option("How often a firing that fails is tried again, before `on_error` applies (rule X1).", least=0)
+        int, Option("How often a failed firing is retried before `on_error` applies (rule X1).", least=0)
     ] = 0
     retry_on: Annotated[
         tuple[str, ...],
         Option(
-            "Only these errors, and those derived from them, are tried again: classes or their names, "
-            '"ConnectionError", "my_robot.nodes:NoAnswer"; by default all are.',
+            "Retry only after these errors and those derived from them: classes or their names, "
+            '"ConnectionError", "my_robot.nodes:NoAnswer"; by default, after all errors.',
             expects="[ConnectionError]",
         ),
     ] = ()
     retry_backoff_s: Annotated[
         float,
         Option(
-            "The pause before the first retry; each further pause is twice as long.",
+            "The pause before the first retry; it doubles with each further retry.",
             least=0,
             remedy="0 tries again at once",
         ),
     ] = 0.1
-    retry_backoff_max_s: Annotated[float, Option("No pause is longer.", least=0, remedy="0 makes no pause at all")] = (
-        30.0
-    )
+    retry_backoff_max_s: Annotated[
+        float, Option("The maximum pause between retries.", least=0, remedy="0 makes no pause at all")
+    ] = 30.0
     retry_jitter: Annotated[
         float,
         Option(
-            "By which part a pause may be shorter, at random.",
+            "The share of a pause by which it may be shortened at random.",
             least=0,
             most=1,
             remedy="0.5 makes pauses up to a half shorter",
@@ -230,17 +242,19 @@ class NodeFields(Fields, kw_only=True):
     concurrency: Annotated[
         int,
         Option(
-            "How many firings of it may be under way at once: of an async function, or in a group with as many threads "
-            "(rule F14).",
+            "How many firings of the node may be in progress at once: for an async function, or in a group with as "
+            "many threads (rule F14).",
             least=1,
         ),
     ] = 1
-    ordered: Annotated[bool, Option("With concurrency: outputs leave in the order in which the firings began.")] = True
-    release: Annotated[Release, Option("When the tokens it takes count as processed (rule F5).")] = "auto"
+    ordered: Annotated[bool, Option("With concurrency: outputs leave in the order in which the firings started.")] = (
+        True
+    )
+    release: Annotated[Release, Option("When the tokens that the node takes count as processed (rule F5).")] = "auto"
     active_for_s: Annotated[
         float | None,
         Option(
-            "How long it may stay active before its `timeout` (rule A12).",
+            "How long the node may stay active before its `timeout` (rule A12).",
             above=0,
             badge="active for {:g} s",
             only="any",
@@ -248,9 +262,12 @@ class NodeFields(Fields, kw_only=True):
     ] = None
     deadline_s: Annotated[
         float | None,
-        Option('How old the oldest token it takes may become, in a group with policy "deadline" (rule R2).', above=0),
+        Option(
+            'The maximum age of the oldest token that the node takes, in a group with policy "deadline" (rule R2).',
+            above=0,
+        ),
     ] = None
-    enabled: Annotated[bool, Option("It is enabled when a run starts.", badge="disabled", only="any")] = True
+    enabled: Annotated[bool, Option("The node is enabled when a run starts.", badge="disabled", only="any")] = True
     iterate_over: Annotated[
         tuple[str, ...],
         Option("The inputs that take collections (rule G4).", expects='["items"]', only="subgraph", badge=_each),
@@ -266,7 +283,7 @@ class NodeOptions(NodeFields, frozen=True):  # type: ignore[misc]  # the same fi
 
 
 class GroupGiven(TypedDict, total=False):
-    """What may be said of a group; None is nothing said."""
+    """The options of a group; None is the default."""
 
     threads: int | None
     policy: Policy
@@ -283,28 +300,28 @@ class GroupFields(Fields, kw_only=True):
     threads: Annotated[
         int,
         Option(
-            "Where its nodes run: n of them at once with n threads.",
+            "How many threads run the nodes of the group: with n threads, n nodes at once.",
             usual="1; 0 where there is a process",
             least=0,
             expects="0 (on the loop), 1 (a thread of its own) or the number of its threads",
             remedy="with n threads up to n of its nodes run at the same time",
         ),
     ] = 0
-    policy: Annotated[Policy, Option("Who is first when several can run (rule R2).")] = "fifo"
+    policy: Annotated[Policy, Option("Which node runs next when several can (rule R2).")] = "fifo"
     seed: Annotated[
-        int | None, Option('For policy "random"; by default that of the run.', expects="a whole number")
+        int | None, Option('The seed for policy "random"; by default that of the run.', expects="a whole number")
     ] = None
     process: Annotated[
         bool,
         Option(
-            "It has a process of its own; edges to and from its nodes become links (rule L1).",
+            "The group has a process of its own; edges to and from its nodes become links (rule L1).",
             remedy="host= names another host than this",
         ),
     ] = False
     host: Annotated[
         str,
         Option(
-            'The agent that is to run that process, as in host="arm"; it implies `process`.',
+            'The agent that runs the process, as in host="arm"; implies `process`.',
             expects='the name of an agent, as in host="arm"',
             fits=lambda host: "/" not in host,
         ),
@@ -312,18 +329,16 @@ class GroupFields(Fields, kw_only=True):
     ledger: Annotated[
         bool | str,
         Option(
-            "What the process has done, its `hfg.State` and its places on all edges are kept together, so that another "
-            "goes on from there when it dies, with nothing lost or doubled: by the run, or in a file that the next run "
-            "goes on from, too.",
+            "Save the state of the nodes and the positions on all edges together. If the process dies, another resumes "
+            "from there, and nothing is lost or duplicated. With a file, the next run resumes from it, too.",
             expects='True (kept by the run) or the path of a file, as in ledger="writer.ledger"',
         ),
     ] = False
     may_misalign: Annotated[
         bool,
         Option(
-            "The run goes on when that process dies although nobody can know how many tokens are lost with it and a "
-            "join behind it may pair what does not belong together; else it fails then (rule L2). `hfg check` says "
-            "where that is so."
+            "Let the run continue when the process dies, even if the number of lost tokens cannot be known and a join "
+            "may pair the wrong tokens; without it, the run fails (rule L2). `hfg check` reports where this can happen."
         ),
     ] = False
 
