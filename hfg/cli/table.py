@@ -136,6 +136,9 @@ class View:
         if glance.lost:
             told.append(_count(glance.lost, "token") + " lost with processes")
         lines = [paint("  ".join([*told, *([_count(errors, "error")] if errors else [])]), _BOLD)]
+        if glance.growing:
+            grown = (f"{label} to {capacity}" for label, capacity in glance.growing.items())
+            lines.append(paint("queues of rings grow:  " + "  ".join(grown), _BOLD))
         active = [row.path for row in rows if row.active]
         if active:
             lines.append(paint("active  " + "  ".join(active), _GREEN))

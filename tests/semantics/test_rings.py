@@ -10,6 +10,7 @@ import pytest
 from reactivex import operators as ops
 
 import hfg
+from hfg.engine import Glance
 from hfg.graph import commands as c
 from hfg.testing import reference_run
 from hfg.testing.conformance import Replay
@@ -518,3 +519,68 @@ def test_the_oracle_sees_a_ring_beside_what_waits() -> None:
     report = reference_run(graph, until_s=2.0)
     assert report.grown == {"gate.request -> ask.value": 24}
     assert len(report.values("ask.out -> gate.answer")) == 40
+
+
+class Doubles(hfg.Node):
+    """Sends two requests for each answer, so that more and more of them go round."""
+
+    request = hfg.Event(int)
+
+    most = hfg.Parameter(400)
+    sent = hfg.State(0)
+
+    @hfg.slot
+    def begin(self) -> None:
+        self.request.trigger(0)
+
+    @hfg.slot
+    def answer(self, number: int) -> None:
+        for _ in range(2):
+            if self.sent < self.most:
+                self.sent += 1
+                self.request.trigger(number)
+
+
+class Answers(hfg.Node):
+    reply = hfg.Event(int)
+
+    @hfg.slot
+    def ask(self, number: int) -> None:
+        self.reply.trigger(number)
+
+
+def doubling(most: int, capacity: int) -> hfg.Graph:
+    graph = hfg.Graph("doubling")
+    gate, answers = graph.add(Doubles(most=most), name="gate"), graph.add(Answers(), name="answers")
+    graph.connect(gate.request, answers.ask, capacity=capacity)
+    graph.connect(answers.reply, gate.answer, capacity=capacity)
+    graph.start.activates(gate.begin)
+    return graph
+
+
+def run_doubling(most: int, capacity: int = 4) -> tuple[hfg.Report, Glance]:
+    graph, runs = doubling(most, capacity), list[hfg.Run]()
+    report = hfg.run(graph, clock="virtual", begin=runs.append)
+    return report, runs[0].glance()
+
+
+@pytest.mark.rule("F8")
+def test_a_ring_whose_queues_grow_many_times_over_is_reported_once(caplog: pytest.LogCaptureFixture) -> None:
+    report, glance = run_doubling(most=400)
+    (error,) = report.errors
+    assert 'the queue of "gate.request -> answers.ask" has grown from capacity=4 to 65' in error
+    assert "because the nodes of the ring gate -> answers -> gate wait for each other (rule F8)" in error
+    assert "declare capacity=130" in error
+    assert caplog.messages.count(error) == 1
+    assert set(glance.growing) == {edge for edge, one in report.edges.items() if one.grown > 60}
+    assert min(glance.growing.values()) > 64
+
+
+@pytest.mark.rule("F8")
+@pytest.mark.parametrize(("most", "capacity"), [(40, 4), (400, 64)], ids=["a few more", "as declared"])
+def test_a_ring_whose_queues_grow_a_little_is_not_reported(
+    caplog: pytest.LogCaptureFixture, most: int, capacity: int
+) -> None:
+    report, glance = run_doubling(most, capacity)
+    assert any(edge.grown for edge in report.edges.values())
+    assert (report.errors, glance.growing, caplog.messages) == ([], {}, [])

@@ -320,6 +320,7 @@ class Core:
         self.recall: Callable[[Worker], None] | None = None  # gives a node back the state that was kept of it
         self.held = False  # the run is paused: nodes move one by one
         self.errors: list[HfgError] = []
+        self.overgrown: list[EventEdge] = []  # queues that F8 has enlarged so often that their ring is reported
         self.lost_activity = 0
         self._has_no_plan()
         self._has_nothing_under_way()

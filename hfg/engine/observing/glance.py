@@ -56,6 +56,7 @@ class Glance(msgspec.Struct, frozen=True):
       machine_s: now, on the machine's monotonic clock.
       nodes: in order of adding, those inside iterating subgraphs too.
       lost: tokens that are gone with processes of groups (L2).
+      growing: capacities by edge: queues that have grown to many times what was declared (F8).
     """
 
     graph: str
@@ -64,6 +65,7 @@ class Glance(msgspec.Struct, frozen=True):
     machine_s: float
     nodes: list[NodeGlance]
     lost: int = 0
+    growing: dict[str, int] = {}
 
 
 def glance_at(engine: Engine) -> Glance:
@@ -96,4 +98,5 @@ def glance_at(engine: Engine) -> Glance:
         machine_s=time.monotonic(),
         nodes=nodes,
         lost=sum(edge.lost for edge in engine.core.edges),
+        growing={edge.label: edge.capacity for edge in engine.core.overgrown if edge in engine.core.edges},
     )

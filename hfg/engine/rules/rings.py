@@ -13,6 +13,7 @@ are looked at again for which something has changed. Stands on `agenda`.
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from collections.abc import Iterable, Iterator
 from typing import Any, Final, TypeAlias
@@ -20,10 +21,12 @@ from typing import Any, Final, TypeAlias
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, CROWDED, ENDED, FIRES_NO_MORE, FULL, Worker
 from hfg.engine.rules.agenda import freed, must_wait
-from hfg.errors import QueueLimit
+from hfg.errors import QueueLimit, RunError
 from hfg.graph.flat.order import strongly_connected
 from hfg.ports.edges import AnyEdge, EventEdge
 from hfg.trace import QueueGrown
+
+_LOGGER = logging.getLogger("hfg.engine")
 
 __all__ = ["grow_queue", "is_held", "look_at_all", "resolve", "smallest_at_rest"]
 
@@ -123,10 +126,59 @@ def grow_queue(core: Core, edge: EventEdge) -> None:
         )
         return
     edge.grow()
+    declared = edge.capacity - edge.grown
+    if edge.capacity == max(_OVERGROWN * declared, _SMALL) + 1:
+        _report_overgrown(core, edge, declared)
     if core.seldom is not None:
         core.seldom(QueueGrown(core.now(), edge.label, edge.capacity))
     freed(edge)
     core.host.kick()
+
+
+_OVERGROWN: Final = 8
+"""A queue with so many times the declared capacity is reported, because its ring may grow for ever."""
+_SMALL: Final = 64  # signals that no queue is reported for
+
+
+def _report_overgrown(core: Core, edge: EventEdge, declared: int) -> None:
+    """Log and report a queue that may grow for ever; once for all queues of a ring."""
+    ring = _ring_of(core, edge)
+    is_reported = any(one.source in ring and one.target in ring for one in core.overgrown)
+    core.overgrown.append(edge)
+    if is_reported:
+        return
+    nodes = " -> ".join(worker.path for worker in ring)
+    around = f"the nodes of the ring {nodes}" if ring else "nodes of several processes"
+    what = (
+        f'the queue of "{edge.label}" has grown from capacity={declared} to {edge.capacity}, because {around} wait for '
+        f"each other (rule F8): declare capacity={2 * edge.capacity} if so many signals may be in transit at once; if "
+        "it keeps growing, the ring is sent more than it takes: let one of its edges drop signals, or set "
+        "capacity_limit="
+    )
+    _LOGGER.warning("%s", what)
+    core.errors.append(RunError(what))
+
+
+def _ring_of(core: Core, edge: EventEdge) -> list[Worker]:
+    """Return the shortest way from the target of an edge back to it, with the source of the edge at both ends."""
+    leads_to: dict[Worker, list[Worker]] = {}
+    for one in core.edges:
+        if one.source is not None and one.target is not None:
+            leads_to.setdefault(one.source, []).append(one.target)
+    came_from: dict[Worker, Worker] = {edge.target: edge.source}
+    ahead = deque([edge.target])
+    while ahead and edge.source not in came_from:
+        worker = ahead.popleft()
+        for after in leads_to.get(worker, ()):
+            if after not in came_from:
+                came_from[after] = worker
+                ahead.append(after)
+    if edge.source not in came_from:
+        return []  # it leads through other processes
+    ring = [edge.source]
+    while len(ring) == 1 or ring[-1] is not edge.source:
+        ring.append(came_from[ring[-1]])
+    return ring[::-1]
 
 
 class _Walk:

@@ -381,7 +381,10 @@ class CutRun(Run):
             if counts.glance is not None:
                 nodes |= {node.path: msgspec.structs.replace(node, age_s=age_s) for node in counts.glance.nodes}
         lost = mine.lost + sum(counts.glance.lost for counts in self._counts.values() if counts.glance is not None)
-        return msgspec.structs.replace(mine, nodes=list(self._in_order(nodes).values()), lost=lost)
+        growing = dict(mine.growing)
+        for counts in self._counts.values():
+            growing |= counts.glance.growing if counts.glance is not None else {}
+        return msgspec.structs.replace(mine, nodes=list(self._in_order(nodes).values()), lost=lost, growing=growing)
 
     def statistics(self) -> Statistics:
         """See `Run.statistics`; of other parts as they last said (see `refresh`), with the age of that."""
