@@ -1,8 +1,8 @@
-"""Graph, the face: what users say about graphs, and nothing of how it is done.
+"""`Graph` and `Subgraph`: the public API for building graphs. The work is done elsewhere.
 
-A graph is the face of a level (`structure`): nodes, edges, gates and the ports of the whole. What is said is checked
-when it is said, and what is refused changes nothing; what only the whole shows waits for `check()`. Stands on all
-wings, which know it by name alone; knows nobody who runs it.
+A graph is the public side of a level (package `structure`): nodes, edges, gates and the ports of the whole graph. Each
+call is checked when it is made, and a refused call changes nothing. Problems that only the whole graph can show wait
+for `check()`. Depends on all packages of `hfg.graph`, which know it only by name, and on no engine.
 """
 
 from __future__ import annotations
@@ -47,13 +47,16 @@ N = TypeVar("N", bound=Node)
 T = TypeVar("T")
 Through: TypeAlias = Callable[[Observable[Any]], Observable[Any]]
 
-_NOBODY: Final[Any] = None  # so that a forgotten `by=` is answered by a sentence
+_NOBODY: Final[Any] = None  # so that a forgotten `by=` gets a clear error
 
 
 class Graph:
-    """An activity flow graph; inside a subgraph, the part of it that lies there.
+    """An activity flow graph, or the part of one inside a subgraph.
 
-    While it runs its structure is changed by commands alone (`run.edit`): whatever else would raises `UsageError`.
+    While the graph runs, only commands can change its structure (`run.edit`); everything else raises `UsageError`.
+
+    Args:
+      name: its name, for people.
 
     Examples:
       >>> import hfg
@@ -80,7 +83,7 @@ class Graph:
 
     @property
     def name(self) -> str:
-        """For people; not part of any path."""
+        """The graph's name, for people. It is not part of any path."""
         return self._level.name
 
     @name.setter
@@ -89,67 +92,70 @@ class Graph:
 
     @property
     def nodes(self) -> dict[str, Node]:
-        """By name, in order of adding."""
+        """The nodes by name, in the order in which they were added."""
         return self._level.nodes
 
     @property
     def edges(self) -> list[Edge]:
-        """In order of connecting."""
+        """The edges, in the order in which they were connected."""
         return self._level.edges
 
     @property
     def gates(self) -> list[Gate]:
-        """In order of gating."""
+        """The gates, in the order in which they were declared."""
         return self._level.gates.listed
 
     @property
     def groups(self) -> dict[str, GroupSpec]:
-        """All groups of the whole graph by name; "loop" is always there."""
+        """All groups of the whole graph by name. "loop" always exists."""
         return self._level.whole.groups.by_name
 
     @property
     def inputs(self) -> dict[str, GraphInput[Any]]:
-        """The ports by which the graph is fed from outside (rule P10)."""
+        """The ports that feed the graph from outside, by name (rule P10)."""
         return self._level.ports.inputs
 
     @property
     def outputs(self) -> dict[str, GraphOutput[Any]]:
-        """The ports at which it is read from outside."""
+        """The ports at which the graph is read from outside, by name (rule P10)."""
         return self._level.ports.outputs
 
     @property
     def start(self) -> EventPort[None]:
-        """The event that begins every run (rule A10); inside a subgraph that of the whole, as the next two are."""
+        """The event that starts every run (rule A10). Inside a subgraph it is the event of the whole graph."""
         return self._level.ports.start
 
     @property
     def stop(self) -> SlotPort[object]:
-        """The slot that ends the run well."""
+        """The slot that ends the run normally."""
         return self._level.ports.stop
 
     @property
     def abort(self) -> SlotPort[object]:
-        """The slot that ends the run in failure."""
+        """The slot that ends the run as a failure."""
         return self._level.ports.abort
 
     @property
     def path(self) -> str:
-        """That of the subgraph whose inside this is; "" for a whole graph."""
+        """The path of the subgraph that contains this graph; "" for a whole graph."""
         return self._level.path
 
     # --- nodes and edges ---
 
     def add(self, node: N, *, name: str | None = None, **options: Unpack[NodeGiven]) -> N:
-        """Add a node and return it; a subgraph builds its inside now.
+        """Add a node and return it. A subgraph builds its inner graph now.
 
         Args:
-          node: belongs to no graph yet.
-          name: its part of the path; by default the type's name, then with _2, _3, in order of adding.
-          **options: how it runs; `help(hfg.graph.NodeOptions)` and docs/reference.md list all.
+          node: a node that belongs to no graph yet.
+          name: its name in paths. Default: the type's name, followed by _2, _3 and so on if it is taken.
+          **options: how the node runs; `help(hfg.graph.NodeOptions)` and docs/reference.md list all options.
+
+        Returns:
+          The node.
 
         Raises:
-          GraphError: the name is taken or not allowed, an option is out of its range, or the node is in a graph
-            already; nothing was changed.
+          GraphError: the name is taken or not allowed, an option is out of range, or the node already belongs to a
+            graph; nothing was changed.
         """
         _need_known(NodeOptions, options, "graph.add")
         add(self._level, node, name, options)
@@ -171,16 +177,20 @@ class Graph:
         self, source: Source[Any] | Observable[Any], target: str, **options: Unpack[EdgeGiven[Any, Through]]
     ) -> Edge: ...
     def connect(self, source: Any, target: Any, **options: Unpack[EdgeGiven]) -> Edge:
-        """Declare an edge from an output or event to an input or slot; a reactivex observable feeds from outside.
+        """Add an edge from an output or event to an input or slot. A reactivex observable can be a source, too.
 
         Args:
-          source: where it begins: the port, or its path, "fetch/camera.out".
+          source: where the edge starts: the port, or its path, "fetch/camera.out".
           target: where it ends, in the same way.
-          **options: how it transports; `help(hfg.graph.EdgeOptions)` and docs/reference.md list all.
+          **options: capacity, buffer, activity and so on; `help(hfg.graph.EdgeOptions)` and docs/reference.md list all
+            options.
+
+        Returns:
+          The edge.
 
         Raises:
-          ConnectionError: the edge cannot be; nothing was changed.
-          GraphError: a path leads nowhere.
+          ConnectionError: the edge is not possible; nothing was changed.
+          GraphError: a path does not exist.
         """
         _need_known(EdgeOptions, options, "graph.connect")
         return connect(self._level, source, target, options)
@@ -188,24 +198,28 @@ class Graph:
     # --- groups and gates ---
 
     def group(self, name: str, **options: Unpack[GroupGiven]) -> GroupSpec:
-        """Declare where nodes run; groups belong to the whole graph, wherever they are declared.
+        """Declare a group: where nodes run. Groups belong to the whole graph, wherever they are declared.
 
         Args:
-          name: what `add(..., group=name)` refers to; "loop" is the event loop, of which only the policy can be chosen.
-          **options: what it is; `help(hfg.graph.GroupSpec)` and docs/reference.md list all.
+          name: the name for `add(..., group=name)`. "loop" is the event loop; only its policy can be chosen.
+          **options: threads, policy, process and so on; `help(hfg.graph.GroupSpec)` and docs/reference.md list all
+            options.
+
+        Returns:
+          The declared group.
 
         Raises:
-          GraphError: a value is out of its range, or the group is declared otherwise already.
+          GraphError: a value is out of range, or the group is already declared with other options.
         """
         _need_known(GroupSpec, options, "graph.group")
         return declare_group(self._level, name, options)
 
     def move(self, node: Node | str, *, group: str | None) -> None:
-        """Let a node run in another group; with a subgraph go all inside that have no group of their own.
+        """Let a node run in another group. Moving a subgraph moves all inner nodes that have no group of their own.
 
         Args:
-          node: of this graph or of a subgraph in it, or its path.
-          group: one that is declared; None is that of the subgraph around the node, at last the loop.
+          node: a node of this graph or of a subgraph in it, or its path.
+          group: a declared group; None for the group of the enclosing subgraph, or else the loop.
 
         Raises:
           GraphError: the node is not in this graph, or the group is not declared; nothing was changed.
@@ -215,16 +229,19 @@ class Graph:
     def gate(
         self, target: Node | str, *others: Never, by: Node | str = _NOBODY, idle_rate_hz: float | None = None
     ) -> Gate:
-        """Couple the work of a node or subgraph to the activity of another: it works while `by` is active (rule A11).
+        """Let a node or subgraph work only while another node, its state node, is active (rule A11).
 
         Args:
-          target: who is gated: a node or subgraph, or its path.
-          others: nobody; they are told how to be said.
+          target: the node or subgraph to gate, or its path.
+          others: not allowed; they only make the error clearer when `by=` is forgotten.
           by: the state node or subgraph, or its path.
-          idle_rate_hz: so many firings a second go on while `by` is inactive; None is none.
+          idle_rate_hz: firings per second that are still allowed while `by` is inactive. None allows none.
+
+        Returns:
+          The gate.
 
         Raises:
-          GraphError: one of the two is not in this graph, or `target` has a gate already; nothing was changed.
+          GraphError: one of the two is not in this graph, or `target` already has a gate; nothing was changed.
         """
         if others or by is _NOBODY:
             raise UsageError(
@@ -236,7 +253,14 @@ class Graph:
     # --- ports of the whole ---
 
     def input(self, name: str, type: TypeForm[T]) -> GraphInput[T]:  # noqa: A002 - the word users know
-        """Declare a port by which the graph is fed from outside, and give what nodes are connected to (rule P10).
+        """Declare a port that feeds the graph from outside (rule P10).
+
+        Args:
+          name: the port's name.
+          type: type of its values, any type hint.
+
+        Returns:
+          The port, to which you connect nodes.
 
         Raises:
           GraphError: the name is taken or not allowed, or this is the inside of a subgraph.
@@ -247,7 +271,14 @@ class Graph:
         return port
 
     def output(self, name: str, type: TypeForm[T]) -> GraphOutput[T]:  # noqa: A002
-        """Declare a port at which the graph is read from outside, and give what nodes are connected to (rule P10).
+        """Declare a port at which the graph is read from outside (rule P10).
+
+        Args:
+          name: the port's name.
+          type: type of its values, any type hint.
+
+        Returns:
+          The port, to which you connect nodes.
 
         Raises:
           GraphError: the name is taken or not allowed, or this is the inside of a subgraph.
@@ -258,31 +289,34 @@ class Graph:
         return port
 
     def promote(self, outer: ParameterPort[T], inner: ParameterPort[T]) -> None:
-        """Let a parameter of the subgraph stand for one inside, which takes its value now and when it is set (rule G3).
+        """Let a parameter of the subgraph set a parameter inside, now and whenever it is set (rule G3).
 
         Args:
-          outer: the subgraph's, `self.speed`; it may stand for several.
-          inner: `node.ports.parameters["limit"]`.
+          outer: the subgraph's parameter, `self.speed`. It can set several inner parameters.
+          inner: the inner parameter, `node.ports.parameters["limit"]`.
 
         Raises:
-          GraphError: the two cannot be one; nothing was changed.
+          GraphError: the two do not fit; nothing was changed.
         """
         promote(self._level, outer, inner)
 
     # --- finding and checking ---
 
     def __getitem__(self, path: str) -> Any:  # noqa: ANN401 - of a path type checkers know nothing
-        """Find a node, "fetch/go_to", or a port, "fetch/go_to.goal"; ports of the whole graph by their name.
+        """Return the node or port at a path: "fetch/go_to", "fetch/go_to.goal".
 
-        Behind a port of a subgraph ".inner" names the side that looks into it.
+        Ports of the whole graph go by their name. Append ".inner" to the path of a subgraph's port for its inner side.
 
         Raises:
-          GraphError: there is none, or an input and an output share the name.
+          GraphError: the path does not exist, or an input and an output share the name.
         """
         return find(self._level, path)
 
     def check(self) -> list[Problem]:
-        """Look for what keeps the graph from working, or probably does; errors first."""
+        """Return everything that keeps the graph from working, or probably does; errors first.
+
+        docs/howto/checks.md has an example and a remedy for each check.
+        """
         return check(self)
 
     def draw(
@@ -295,23 +329,28 @@ class Graph:
         ports: Literal["used", "all"] = "used",
         format: Literal["svg", "mmd", "dot"] | None = None,  # noqa: A002 - the word users know
     ) -> str:
-        """Draw it and give the text of the drawing; in a notebook a graph is shown by itself.
+        """Draw the graph and return the drawing as text. Notebooks show a graph without this.
 
-        An SVG has the notation of the paper: inputs left, outputs right, slots on top, events at the bottom; dark
-        squares are synchronous, light circles asynchronous, double lines active edges. What is active in a run has a
-        thick border.
+        An SVG uses the notation of the paper: inputs left, outputs right, slots on top, events at the bottom; dark
+        squares are synchronous, light circles asynchronous, double lines active edges. Nodes that are active in a run
+        have a thick border.
 
         Args:
-          path: a file that ends in ".svg", ".mmd" (Mermaid) or ".dot" (Graphviz); without it nothing is written.
-          depth: so many subgraphs inside each other are shown open, 0 shows all of them folded; None folds none.
-          fold: subgraphs, or their paths, that are folded whatever the depth.
-          active: which nodes and subgraphs are shown as active, as `run.active()` gives them; None: those that are now.
-          ports: "all" shows those, too, that no edge leads to.
-          format: "svg", "mmd" or "dot", whatever the file is called; without a file and this the text is Mermaid.
+          path: the file to write; its name ends in ".svg", ".mmd" (Mermaid) or ".dot" (Graphviz). By default no file is
+            written.
+          depth: how many levels of subgraphs to show expanded; 0 collapses all, None expands all.
+          fold: subgraphs, or their paths, to collapse regardless of `depth`.
+          active: the nodes and subgraphs to show as active, as `run.active()` returns them. Default: those that are
+            active now.
+          ports: "all" also shows ports without an edge.
+          format: "svg", "mmd" or "dot", regardless of the file's name. Default without a file: Mermaid.
+
+        Returns:
+          The text of the drawing.
 
         Raises:
-          GraphError: a node is not in the graph, or is to be folded and no subgraph.
-          UsageError: the file has another ending, or cannot be written, or an argument is none of its kind.
+          GraphError: a node is not in the graph, or something to collapse is not a subgraph.
+          UsageError: the file's name has another ending, the file cannot be written, or an argument is invalid.
         """
         from hfg.graph.drawing.formats import draw, view_of  # here, for most programs draw nothing
 
@@ -320,11 +359,14 @@ class Graph:
     # --- editing ---
 
     def edit(self, *commands: Command) -> None:
-        """Carry commands out, all of them or, when one is refused, none; a graph that runs is edited by `run.edit`.
+        """Carry out commands: all of them, or none if one is refused. For a running graph, use `run.edit`.
+
+        Args:
+          *commands: edits from `hfg.commands`, in order.
 
         Raises:
-          GraphError: one cannot be; the message says which and why.
-          UsageError: the graph runs, or is the inside of a subgraph.
+          GraphError: a command cannot be carried out; the message says which one and why.
+          UsageError: the graph is running, or is the inside of a subgraph.
 
         Examples:
           >>> from hfg import Graph, commands
@@ -338,24 +380,26 @@ class Graph:
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is an edit to take back; of the last 1,000."""
+        """Whether there is an edit to undo. The last 1,000 edits are kept."""
         return bool(self._level.whole.history.done)
 
     @property
     def can_redo(self) -> bool:
-        """Whether an edit was undone last, so that it can be carried out again."""
+        """Whether the last change was an undo, so that its edit can be carried out again."""
         return bool(self._level.whole.history.undone)
 
     @property
     def history(self) -> tuple[tuple[Command, ...], ...]:
-        """The edits that can be taken back, as they were given, the last one last; of the last 1,000."""
+        """The edits that can be undone, as they were given, the latest last. The last 1,000 edits are kept."""
         return tuple(transaction.commands for transaction in self._level.whole.history.done)
 
     def notes(self, path: str = "") -> dict[str, Any]:
-        """Give what editors have noted by `commands.Note` about a node or subgraph, by name; nothing else reads it.
+        """Return the notes that editors keep about a node or subgraph with `commands.Note`, by name.
+
+        hfg does not use notes itself.
 
         Args:
-          path: of the node; "" for the free notes about the whole graph.
+          path: the path of the node; "" for the notes about the whole graph.
 
         Raises:
           GraphError: there is no such node.
@@ -363,13 +407,13 @@ class Graph:
         return copy.deepcopy(self._level.whole.notes.get(node_at(self._level, path) if path else None, {}))
 
     def as_commands(self) -> list[Command]:
-        """Give the commands that make this graph: in one edit of an empty graph they give an equal one.
+        """Return the commands that build this graph: one edit of an empty graph with them makes an equal graph.
 
-        Nodes are made by the references of their types, so types that cannot be found by name are refused, and so are
-        values and code on edges that are no data.
+        Commands name node types by reference, so types that cannot be found by name are refused. So are values and code
+        on edges that are not data.
 
         Raises:
-          GraphError: something cannot be said by commands; the message names it and what to do.
+          GraphError: part of the graph cannot be expressed as commands; the message names it and what to do.
 
         Examples:
           >>> from hfg import Graph, commands
@@ -386,27 +430,30 @@ class Graph:
         return as_commands(self._level)
 
     def undo(self) -> None:
-        """Take the last edit back: everything is exactly as before it.
+        """Undo the last edit: the graph is exactly as it was before.
 
         Raises:
-          UsageError: there is none, or the graph was changed by hand since, or runs.
+          UsageError: there is no edit to undo, the graph was changed by other means since, or it is running.
         """
         transactions.undo(self)
 
     def redo(self) -> None:
-        """Carry the edit out again that was undone last.
+        """Carry out the edit again that was undone last.
 
         Raises:
-          UsageError: there is none, or the graph was changed since, or runs.
+          UsageError: there is no edit to redo, the graph was changed since, or it is running.
         """
         transactions.redo(self)
 
     def reload(self, module: str | ModuleType) -> None:
-        """Run a changed module again; its node types replace those of its nodes, parameters are kept.
+        """Reload a changed module and replace the nodes whose types it defines. Parameters are kept.
+
+        Args:
+          module: the module, or its name.
 
         Raises:
           GraphError: the module fails, or a new type does not fit the edges; nothing was changed.
-          UsageError: the graph runs: `run.reload` is for that.
+          UsageError: the graph is running: use `run.reload`.
         """
         transactions.reload(self, module)
 
@@ -447,8 +494,8 @@ def _face_of(level: Level) -> Graph:
 class Subgraph(Box):
     """A node that holds a graph.
 
-    Ports are declared as on any node; `.inner` is the side of a port that looks into the box. A slot needs no handler:
-    `begin = hfg.slot(type=int)`. The graph inside is built when the subgraph is added.
+    Declare ports as on any node; `.inner` is the inner side of a port. A slot needs no handler:
+    `begin = hfg.slot(type=int)`. The inner graph is built when the subgraph is added to a graph.
 
     Examples:
       >>> import hfg
@@ -468,8 +515,8 @@ class Subgraph(Box):
       ['double', 'double_2']
 
     Attributes:
-      iterate_over: names of inputs that take collections, whose elements the inside sees one by one; the declared types
-        are those inside (rule G4).
+      iterate_over: names of inputs that take collections; the inner graph receives their elements one by one. The
+        declared types are those of the elements (rule G4).
     """
 
     __slots__ = ()
@@ -477,7 +524,11 @@ class Subgraph(Box):
     _is_base: ClassVar[bool] = True
 
     def build(self, graph: Graph) -> None:
-        """Add the nodes inside and connect them, also with the inner sides of the subgraph's own ports."""
+        """Add the inner nodes and connect them, also to the inner sides of the subgraph's own ports. Override this.
+
+        Args:
+          graph: the empty inner graph.
+        """
 
     @property
     def graph(self) -> Graph:
