@@ -1,7 +1,7 @@
-# Each target sets up what it needs in .venv by itself; nothing but Python 3.11 or newer, pip and make has to be there.
-# Another Python: make PYTHON=python3.12 test (remove .venv first if it was made with a different one).
+# Each target sets up what it needs in .venv. Only Python 3.11 or newer, pip and make are required.
+# To use another Python: make PYTHON=python3.12 test (first remove a .venv made with a different one).
 
-# Many tests begin processes: without bytecode each would compile all that it imports.
+# Many tests start processes. Without bytecode, each would compile everything that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
 PYTHON ?= python3
@@ -9,7 +9,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/ready
 
-# The bench targets write a line of JSON per case into RESULTS; bench-docs makes the tables of docs/speed.md from them.
+# The bench targets write one line of JSON per case into RESULTS; bench-docs generates the tables of docs/speed.md from them.
 RESULTS := benchmarks/results
 PEERS   := .venv-peers
 
@@ -18,26 +18,26 @@ PEERS   := .venv-peers
 
 help:
 	@echo "make demo    a robot fetches and delivers cubes; score, video and report in out/fetch_delivery, in less than 3 minutes"
-	@echo "make photographs   search, measure and report on real photographs, watched and steered"
+	@echo "make photographs   search, measure and report on real photographs, watched and controlled"
 	@echo "make test    run all tests (without the long ones)"
 	@echo "make lint    ruff, mypy and the check of our English"
-	@echo "make bench   run the benchmarks (bench-peers: beside other libraries; bench-docs: into docs/speed.md;"
-	@echo "             bench-goals: what is to be reached, and whether it is; bench-links: from process to process)"
+	@echo "make bench   run the benchmarks (bench-peers: with other libraries; bench-docs: write docs/speed.md;"
+	@echo "             bench-goals: the goals, and whether they are reached; bench-links: between processes)"
 	@echo "make docs    build the documentation as a site in build/site"
 	@echo "make docs-nodes   write docs/nodes from the docstrings of the library"
-	@echo "make docs-drawings   draw the graphs in README and docs anew"
+	@echo "make docs-drawings   redraw the graphs in README and docs"
 	@echo "make docs-mermaid   draw the Mermaid diagrams in docs for the site; needs Chromium and npm"
 	@echo "make soak    run the tests that take minutes"
-	@echo "make clean   remove .venv and everything tools have left"
+	@echo "make clean   remove .venv and everything that tools have left"
 
-# Ends earlier, with what there is by then, on a machine that is too slow for it.
+# On a slow machine it ends earlier, and reports what there is by then.
 demo: $(READY)
 	$(BIN)/python -m examples.fetch_delivery --minutes 2 --within 120 --report out/fetch_delivery
 
 photographs: $(READY)
 	$(BIN)/python examples/photographs.py
 
-# As many processes as there are cores; without them: .venv/bin/python -m pytest
+# Uses one process per core; with a single process: .venv/bin/python -m pytest
 test: $(READY)
 	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
@@ -50,7 +50,7 @@ lint: $(READY)
 bench: $(READY)
 	$(BIN)/python -m benchmarks --json $(RESULTS)
 
-# The others have an environment of their own: nothing of hfg needs them. One that cannot be installed is named, and skipped.
+# The other libraries have an environment of their own, because hfg does not need them. If one cannot be installed, it is reported and skipped.
 peers: $(READY)
 	@test -x $(PEERS)/bin/python || "$(PYTHON)" -m venv $(PEERS)
 	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[examples,zenoh]'
@@ -61,7 +61,7 @@ bench-peers: peers
 	$(PEERS)/bin/python -m benchmarks bench_peers --json $(RESULTS)
 	$(PEERS)/bin/python -m benchmarks.profile_hop --json $(RESULTS)
 
-# AGAINST=DIR, another checkout of hfg, adds what is compared with it.
+# AGAINST=DIR, another checkout of hfg, adds comparisons with it.
 bench-goals: peers
 	$(PEERS)/bin/python -m benchmarks bench_goals --json $(RESULTS) $(if $(AGAINST),--against "$(AGAINST)")
 
@@ -95,7 +95,7 @@ clean:
 	rm -rf $(VENV) $(PEERS) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# Made once, and made anew when pyproject.toml is newer. The old one goes first: an interrupted set-up never looks like a finished one.
+# Made once, and again when pyproject.toml is newer. The old one is removed first, so that an interrupted set-up never looks complete.
 $(READY): pyproject.toml
 	@command -v "$(PYTHON)" >/dev/null 2>&1 || { \
 	  echo "hfg needs Python 3.11 or newer, but there is no '$(PYTHON)' here; name yours: make PYTHON=/path/to/python3" >&2; exit 1; }
