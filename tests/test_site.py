@@ -80,6 +80,19 @@ def test_a_link_that_leads_nowhere_is_found(tmp_path: Path) -> None:
     assert build_docs.dead_links(tmp_path) == ["a.html: b.html#there", "b.html: none.svg", "b.html: #gone"]
 
 
+def test_rules_and_pages_that_a_text_names_become_links() -> None:
+    page = (
+        '<nav>F5</nav><article><h2>F5</h2>see F5, H264, docs/limits.md <code>F5</code> <a href="#x">F5</a></article>F5'
+    )
+    linked = build_docs.link_references(page, "../", {"F5": "f5-processed"})
+    assert re.findall(r"<a[^>]*>[^<]*</a>", linked) == [
+        '<a href="../semantics.html#f5-processed">F5</a>',
+        '<a href="../limits.html">docs/limits.md</a>',
+        '<a href="#x">F5</a>',
+    ]
+    assert re.sub(r"</?a[^>]*>", "", linked) == re.sub(r"</?a[^>]*>", "", page)
+
+
 # --- the site ---------------------------------------------------------------------------------------------------------
 
 

@@ -7,7 +7,7 @@
 
 1. Copy `docs/` to `build/docs` and translate what GitHub and the site write differently: see `stage`.
 2. Build the site with Zensical, which fails if a link or an anchor is broken.
-3. Finish the pages: link rule numbers to the rules, and load the search's script from the site: see `finish`.
+3. Finish the pages: link the rules and pages that they name, and load the search's script from the site: see `finish`.
 4. Check that every page is complete and loads nothing from another host: see `problems`.
 """
 
@@ -134,11 +134,11 @@ def build() -> None:
 
 _TAG = re.compile(r"<!--.*?-->|<[^>]*>", re.S)
 _KEEPS_TEXT = {"a", "code", "pre", "script", "style", "title", "svg", "h1", "h2", "h3", "h4", "h5", "h6"}
-_RULE = re.compile(r"(?<![\w.#/%:*-])([TPFAGXRL]\d{1,2})(?![\w*]|[.:]\w)")
+_REFERENCE = re.compile(r"(?<![\w.#/%:*-])(?:([TPFAGXRL]\d{1,2})(?![\w*]|[.:]\w)|docs/([\w/-]+)\.md)")
 
 
 def finish() -> None:
-    """Link rule numbers to the rules, and let every page load the search's script from the site itself.
+    """Link rules and pages that are named, and let every page load the search's script from the site itself.
 
     The theme's script can load tools that no page of ours uses (Mermaid, an image viewer, Python) from other hosts.
     Their addresses are made invalid, so that the check of step 4 need not know which of them matter.
@@ -149,18 +149,18 @@ def finish() -> None:
         up = "../" * (len(page.relative_to(SITE).parts) - 1)
         text = page.read_text(encoding="utf-8").replace(_SHIM, f"{up}assets/iframe-worker.js")
         if page.name != "cv.html":  # "L1" is a norm there
-            text = _link_rules(text, f"{up}semantics.html", anchors)
+            text = link_references(text, up, anchors)
         page.write_text(text, encoding="utf-8")
     for script in (SITE / "assets" / "javascripts").rglob("*.js"):
         script.write_text(_SCRIPTS_LOAD.sub("removed:", script.read_text(encoding="utf-8")), encoding="utf-8")
 
 
-def _link_rules(page: str, semantics: str, anchors: dict[str, str]) -> str:
-    """Make a link of each rule number in the text of an article."""
+def link_references(page: str, up: str, anchors: dict[str, str]) -> str:
+    """Make links of rule numbers ("F5") and of pages ("docs/limits.md") in the text of an article."""
 
     def link(match: re.Match[str]) -> str:
-        anchor = anchors.get(match[1])
-        return f'<a class="rule" href="{semantics}#{anchor}">{match[1]}</a>' if anchor else match[1]
+        target = f"semantics.html#{anchors[match[1]]}" if match[1] in anchors else f"{match[2]}.html"
+        return match[0] if match[1] and match[1] not in anchors else f'<a href="{up}{target}">{match[0]}</a>'
 
     start, end = page.find("<article"), page.find("</article>")
     if start < 0 or end < 0:
@@ -168,7 +168,7 @@ def _link_rules(page: str, semantics: str, anchors: dict[str, str]) -> str:
     article, done, inside, at = page[start:end], [], 0, 0
     for tag in _TAG.finditer(article):
         text = article[at : tag.start()]
-        done += [text if inside else _RULE.sub(link, text), tag[0]]
+        done += [text if inside else _REFERENCE.sub(link, text), tag[0]]
         at = tag.end()
         name = re.match(r"</?(\w+)", tag[0])
         if name and name[1] in _KEEPS_TEXT:
