@@ -1,12 +1,12 @@
-"""Activity, pure: nothing here waits.
+"""Activity as plain functions and values; nothing here waits.
 
-rules          what a node becomes by what it takes, and what leaves it (A3-A6)
+rules          the effect of received tokens, and what senders pass on (A3-A6)
 fsm            StateMachine: its words, its graph
-description    machines as data, and what is wrong with one
+description    machines as data, and errors in them
 machine_dicts  machines from dicts          translation   a machine as a graph and back (A13)
 states         nodes that are states
-analysis       who can ever become active; adds to the checks of graphs
-explicit       what the code of a node type shows of that (A4)
+analysis       the nodes that can ever become active; adds to the checks of graphs
+explicit       what the code of a node type reveals about that (A4)
 """
 
 from hfg.activity.analysis import ActivityAnalysis

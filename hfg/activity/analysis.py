@@ -1,9 +1,9 @@
-"""Who can ever become active, found without running: a fixed point over active edges (rules A3-A12, G2).
+"""The nodes that can ever become active, found without running: a fixed point over active edges (rules A3-A12, G2).
 
-What gives activity: `start`, an edge into a slot `activate`, feeds from outside, code that may send a modifier of its
-own (A4), and whoever is active, over its active edges. Whatever is in doubt counts as yes. Nobody inside the graph can
-know what a program outside does: `run.trigger(slot, activity=+1)` makes anybody active; so what is found is a warning,
-or a hint where all activity may come from there. Stands on the flat graph and `explicit`.
+Activity comes from `start`, from edges into a slot `activate`, from feeds, from code that may send a modifier of its own
+(A4), and from active nodes over their active edges. Anything uncertain counts as possible. A program outside the graph
+can activate any node, by `run.trigger(slot, activity=+1)`; so each result is only a warning, or a hint if all activity
+may come from outside. Depends on the flat graph and `explicit`.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ __all__ = ["ActivityAnalysis", "activity_problems"]
 
 
 class ActivityAnalysis:
-    """What may happen to activity in one flat graph.
+    """The possible effects of activity in one flat graph.
 
     Nodes and subgraphs are named as in `End.node`.
 
     Attributes:
       active: per node, whether it may ever become active.
-      asks: what in the graph depends on the activity of a node or subgraph, in words.
+      asks: per node or subgraph, the things in the graph that depend on its activity, in words.
     """
 
     def __init__(self, flat: FlatGraph) -> None:
@@ -48,19 +48,19 @@ class ActivityAnalysis:
         self.asks = self._find_asking()
 
     def path(self, end: int) -> str:
-        """Of a node or subgraph."""
+        """Return the path of a node or subgraph."""
         return self.flat.nodes[end].path if end > ROOT else self.flat.scopes[scope_end(end)].path
 
     def members(self, end: int) -> list[int]:
-        """The node itself, or those in the subgraph."""
+        """Return the node itself, or the nodes in the subgraph."""
         return [end] if end > ROOT else self.flat.scopes[scope_end(end)].members
 
     def may_be_active(self, end: int) -> bool:
-        """Whether it may; a subgraph is active while something inside is (G2)."""
+        """Return whether a node or subgraph may become active. A subgraph is active while a node inside is (G2)."""
         return any(self.active[member] for member in self.members(end))
 
     def may_carry(self, edge: FlatEdge) -> bool:
-        """Whether a token with +1 may ever leave over an active edge (A3, A4)."""
+        """Return whether a token with +1 may ever leave over an active edge (A3, A4)."""
         source = edge.source
         if source.node == ROOT:
             return True  # `start`, or a feed: the program outside decides
@@ -74,7 +74,7 @@ class ActivityAnalysis:
         return self._gives[source.node] or self.active[source.node]
 
     def _spread(self) -> None:
-        """Let activity go wherever it may, until nothing changes."""
+        """Spread activity wherever it may go, until nothing changes."""
         waiting: deque[int] = deque()
 
         def activate(index: int) -> None:
@@ -126,7 +126,7 @@ class ActivityAnalysis:
 
 @also
 def activity_problems(flat: FlatGraph) -> Iterator[Problem]:
-    """Who waits for activity that never comes, edges that never carry it, and where one state becomes two."""
+    """Yield problems: activity that never arrives, edges that never carry any, and states that become two."""
     asked = flat.gates or _has_time_limits(flat) or any(map(_does, flat.nodes))
     if not asked and not any(edge.active for edge in flat.edges):
         return

@@ -2,7 +2,7 @@
 
 A machine is states, an initial one, transitions by letters, and final states: (Σ, S, s0, Δ, F) of the paper's §5.3.3.
 Everything that reads or translates machines speaks in descriptions; `StateMachine` is one that is known to be right.
-Stands on problems and errors.
+Depends on errors only.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Transition(NamedTuple):
 
 
 class Described(NamedTuple):
-    """What is said about a machine; the fields are those of `StateMachine`."""
+    """The description of a machine; the fields are those of `StateMachine`."""
 
     states: Sequence[str]
     transitions: Sequence[Transition]
@@ -52,10 +52,14 @@ class Described(NamedTuple):
 
 
 def reject(sentence: str, problems: Iterable[Problem]) -> None:
-    """Raise if there are errors among the findings; the sentence says what follows from them.
+    """Raise if there are errors among the problems.
+
+    Args:
+      sentence: the first line of the message.
+      problems: what was found.
 
     Raises:
-      MachineError: with all of them, errors first.
+      MachineError: with all problems, errors first.
     """
     found = sorted(dict.fromkeys(problems), key=lambda problem: problem.severity != "error")
     if found and found[0].severity == "error":
@@ -68,7 +72,7 @@ def reject(sentence: str, problems: Iterable[Problem]) -> None:
 def findings(
     states: Any, transitions: Any, initial: Any, final: Any, missing: Any, places: Sequence[str] = ()
 ) -> Iterator[Problem]:
-    """Give everything that is wrong at once; parts of a wrong shape are left out of the other checks.
+    """Yield everything that is wrong. Parts of a wrong shape are not checked further.
 
     Args:
       states: as given, as are the next four.

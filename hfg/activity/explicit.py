@@ -1,7 +1,7 @@
 """Whether the code of a node type may give activity by itself (rule A4): what can be known by reading it.
 
 Code makes activity with `activity=...` in a send or trigger, by a token that it makes, or by its own slot `activate`.
-It may also hide that well, so the answer "no" means "not that its code shows". Stands on node types.
+It may also hide that well, so the answer "no" means "not that its code shows". Depends on node types.
 """
 
 from __future__ import annotations

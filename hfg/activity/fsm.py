@@ -1,7 +1,7 @@
 """State machines as values: what they are, and which words they accept.
 
-Stands on `description`, which says what is wrong with one, `machine_dicts`, which reads dicts, and `translation`, which
-makes a graph of it and reads it back; nothing here runs.
+Depends on `description`, which finds errors in machines, `machine_dicts`, which reads dicts, and `translation`, which
+converts machines to graphs and back. Nothing here runs.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ __all__ = ["StateMachine"]
 
 @dataclass(frozen=True, init=False, slots=True)
 class StateMachine:
-    """A deterministic state machine; a value, made once and never changed.
+    """A deterministic state machine as an immutable value.
 
     Attributes:
-      states: in order.
-      initial: the state in which every word begins.
-      transitions: in order, each once.
+      states: the names of the states, in order.
+      initial: the state in which every word starts.
+      transitions: the transitions, in order, each once.
       final: the states in which an accepted word ends.
-      missing: what becomes of a letter for which a state has no transition: it leads to a "dead" state that nothing
-        leaves, as rule A13 says, or is "ignore"d.
+      missing: what happens at a letter for which a state has no transition: the machine enters a "dead" state that it
+        never leaves, as rule A13 says, or it "ignore"s the letter.
 
     Examples:
       >>> door = StateMachine(
@@ -64,17 +64,17 @@ class StateMachine:
         final: Iterable[str] = (),
         missing: Missing = "dead",
     ) -> None:
-        """Make a machine.
+        """Create a machine.
 
         Args:
-          states: their names.
-          transitions: each (letter, source, target).
-          initial: the state in which every word begins.
+          states: the names of the states.
+          transitions: the transitions, each as (letter, source, target).
+          initial: the state in which every word starts.
           final: the states in which an accepted word ends.
-          missing: what a letter without a transition does.
+          missing: what happens at a letter without a transition: "dead" or "ignore".
 
         Raises:
-          MachineError: it is none; `problems` holds every finding.
+          MachineError: this is not a deterministic machine; `problems` lists everything that is wrong.
         """
         named, ways, ending = listed(states), listed(transitions), listed(final)
         reject("this is no state machine", findings(named, ways, initial, ending, missing))
@@ -87,33 +87,42 @@ class StateMachine:
 
     @classmethod
     def from_dict(cls, description: Mapping[str, Any]) -> StateMachine:
-        """Read a dict of the kind that the package `transitions` takes.
+        """Create a machine from a dict in the format of the package `transitions`.
 
-        `states` are names or dicts with a `name`; `transitions` are lists [trigger, source, dest] or dicts with these
-        keys, where the source may be a list or "*" for all states, and the dest "=" or None for the source itself. The
-        triggers are the letters. `final` lists the final states, unless the states say it themselves.
+        `states` are names or dicts with a `name`. `transitions` are lists [trigger, source, dest] or dicts with these
+        keys. The source may be a list, or "*" for all states; the dest "=" or None is the source itself. The triggers
+        are the letters. `final` lists the final states, unless the states are marked as final themselves.
+
+        Args:
+          description: the dict.
+
+        Returns:
+          The machine.
 
         Raises:
-          MachineError: the dict has another shape, says what a description cannot hold (conditions and callbacks are
-            code and belong into nodes), or describes no machine; `problems` holds every finding.
+          MachineError: the dict has another format, does not describe a machine, or contains conditions or callbacks,
+            which are code and belong into nodes; `problems` lists everything that is wrong.
         """
         return cls._of(read(description))
 
     @classmethod
     def of(cls, graph: Graph, nodes: Iterable[Node | str] | None = None, *, final: Iterable[str] = ()) -> StateMachine:
-        """Read the machine out of a graph, or out of a region of it: the inverse of `graph`.
+        """Read the machine from a graph, or from a region of it: the inverse of `graph`.
 
-        States are the nodes' paths, letters the names of the events that active edges leave by.
+        States are the paths of the nodes; letters are the names of the events at which active edges start.
 
         Args:
           graph: a whole graph.
-          nodes: the states, as nodes or paths; a subgraph stands for all inside. Without them, every node that an
-            active edge leads to or from.
-          final: states that are final, beside those whose node says so itself (`StateNode.final`).
+          nodes: the states, as nodes or paths; a subgraph represents all nodes inside. Default: every node at either
+            end of an active edge.
+          final: states that are final, in addition to those whose node is marked as final (`StateNode.final`).
+
+        Returns:
+          The machine.
 
         Raises:
-          MachineError: it is none, because one signal would make several nodes active, or none would be at the start;
-            `problems` holds every finding.
+          MachineError: the graph is not a machine, because one signal would activate several nodes, or no node would be
+            active at the start; `problems` lists everything that is wrong.
         """
         return cls._of(read_out(graph, nodes, final))
 
@@ -125,7 +134,11 @@ class StateMachine:
     # --- words ---
 
     def after(self, word: Iterable[str]) -> str | None:
-        """Give the state that a word leads to; None is the dead state."""
+        """Return the state after a word, or None for the dead state.
+
+        Args:
+          word: the letters.
+        """
         ways = {(one.source, one.letter): one.target for one in self.transitions}
         state: str | None = self.initial
         for letter in word:
@@ -134,13 +147,22 @@ class StateMachine:
         return state
 
     def accepts(self, word: Iterable[str]) -> bool:
-        """Say whether a word leads to a final state."""
+        """Return whether a word ends in a final state.
+
+        Args:
+          word: the letters.
+        """
         return self.after(word) in self.final
 
     # --- graphs ---
 
     def graph(self, name: str = "machine", *, nodes: Mapping[str, Node | SlotPort[Any]] | None = None) -> Graph:
-        """Make a graph of it, whose input "letters" takes the words; the arguments are those of `build`."""
+        """Return a graph that is this machine. Its input "letters" receives the words.
+
+        Args:
+          name: the graph's name.
+          nodes: nodes of your own for some of the states; see `build`.
+        """
         graph = Graph(name)
         self.build(graph, letters=graph.input("letters", str), nodes=nodes)
         return graph
@@ -153,23 +175,22 @@ class StateMachine:
         begin: Source[Any] | None = None,
         nodes: Mapping[str, Node | SlotPort[Any]] | None = None,
     ) -> dict[str, Node]:
-        """Add it to a graph: a node for each state, an active edge for each transition (rule A13).
+        """Add the machine to a graph: a node for each state and an active edge for each transition (rule A13).
 
         Args:
-          graph: where to.
-          letters: an output or event that says the next letter; the active state hears it, by its slot `read`. Without
-            it, states leave by their own events alone.
-          begin: whose signal makes the initial state active; by default the graph's `start`.
-          nodes: nodes of your own for some of the states, in the graph already or not. The letters they answer are
-            events of these names; activity comes in by a slot `enter`, or by the slot that is given in place of the
-            node, `{"open": door.begin}`, or else by `activate`. Derive from
-            `hfg.activity.StateNode` to get the usual behaviour.
+          graph: the graph.
+          letters: an output or event that sends the letters; the active state receives them in its slot `read`. Without
+            it, states change only by their own events.
+          begin: the event or output whose signal activates the initial state. Default: the graph's `start`.
+          nodes: nodes of your own for some of the states, whether or not they are in the graph yet. Their letters are
+            events of the same names. Activity enters by a slot `enter`, by the slot that is given instead of the node,
+            `{"open": door.begin}`, or else by `activate`. Derive from `hfg.activity.StateNode` for the usual behaviour.
 
         Returns:
-          The node of each state.
+          The node of each state, by the state's name.
 
         Raises:
-          MachineError: a node cannot be the state, or a state's name cannot be that of a node; nothing was changed.
+          MachineError: a node cannot be the state, or a state's name is not allowed for a node; nothing was changed.
         """
         described = Described(self.states, self.transitions, self.initial, self.final, self.missing)
         return build(described, graph, letters, begin, nodes or {})
@@ -177,5 +198,5 @@ class StateMachine:
     # --- checks ---
 
     def check(self) -> list[Problem]:
-        """Look for what is probably a mistake: states that no word leads to."""
+        """Return probable mistakes: states that no word reaches."""
         return list(unreachable(self.states, self.transitions, self.initial))

@@ -1,8 +1,6 @@
-"""The rules of activity as functions over values (rules A3-A6): what a node becomes by what it takes.
+"""The rules of activity as functions over values (rules A3-A6): the effect of received tokens, and what senders pass on.
 
-And what leaves it.
-
-Nothing here knows nodes, edges or time. Depends on nothing.
+Nothing here depends on nodes, edges or time.
 """
 
 from __future__ import annotations

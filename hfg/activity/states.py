@@ -1,8 +1,7 @@
-"""Nodes that are states of a machine: what a letter does to them, and a type for each set of letters.
+"""Nodes that are states of a machine: how they react to letters, and a type for each set of letters.
 
-A state that nobody wrote has an event for each letter it knows. Such a type is made from its letters alone, so it can
-be found by name like any other: `hfg.activity.states:State[push,pull]`. Stands on node types; knows neither machines
-nor graphs.
+A generated state has an event for each letter that it knows. Its type is determined by its letters, so it can be found
+by name like any other type: `hfg.activity.states:State[push,pull]`. Depends on node types, not on machines or graphs.
 """
 
 from __future__ import annotations
@@ -24,16 +23,16 @@ _OWN: Final = frozenset({"enter", "final", "missing", "read"})
 
 
 class StateNode(Node):
-    """A state: while it is active it answers a letter by the event of that name, and an active edge leads on.
+    """A state of a machine. While it is active, it answers a letter by triggering the event of that name.
 
-    Derive from it for states that do something: declare an event for each letter, and work in `on_activated` or in an
-    `enter` of your own.
+    An active edge from that event leads to the next state. Derive from this class for states that do something: declare
+    an event for each letter, and work in `on_activated`, in `do`, or in an `enter` of your own.
 
     Attributes:
-      enter: activity comes in here.
-      read: takes the letters that come while it is active.
-      missing: answers letters that the state has no event for.
-      final: whether a word that ends here is accepted; for whoever reads the machine out of the graph.
+      enter: the slot by which activity enters.
+      read: the slot that receives letters while the node is active.
+      missing: the event that answers letters for which the state has no event.
+      final: whether a word that ends here is accepted. Only `StateMachine.of` reads it.
     """
 
     missing = Event(str)
@@ -41,11 +40,15 @@ class StateNode(Node):
 
     @slot
     def enter(self) -> None:
-        """Become active: the edge does that."""
+        """Become active. The active edge does the work; override this to do more."""
 
     @slot(while_active=True)
     def read(self, letter: str) -> None:
-        """Answer a letter."""
+        """Answer a letter by triggering its event, or `missing`.
+
+        Args:
+          letter: the letter.
+        """
         name = event_name(letter)
         if name in self._type.events:
             self._port("event", name).trigger()
@@ -55,16 +58,16 @@ class StateNode(Node):
 
 @node
 def one_by_one(letter: str) -> str:
-    """Give letters on as data, so that each is read by all states before the next one comes.
+    """Pass letters on as data, so that all states have read a letter before the next one arrives.
 
-    Signals alone would not do: a letter could reach the state that is about to become active too early.
+    With signals, a letter could reach the state that is about to become active too early.
     """
     return letter
 
 
 @functools.lru_cache(maxsize=1024)
 def event_name(letter: str) -> str:
-    """Give the name of the event that answers a letter: itself, unless no event can be called that."""
+    """Return the name of the event that answers a letter: the letter, unless an event cannot have that name."""
     can_be = letter.isidentifier() and not letter.startswith(("_", _MANGLED))
     if can_be and letter not in RESERVED and letter not in _OWN:
         return letter
@@ -72,7 +75,7 @@ def event_name(letter: str) -> str:
 
 
 def letter_name(event: str) -> str:
-    """Give the letter that an event answers; the inverse of `event_name`."""
+    """Return the letter that an event answers; the inverse of `event_name`."""
     if not event.startswith(_MANGLED):
         return event
     parts = event.removeprefix(_MANGLED).split("_")
@@ -80,7 +83,7 @@ def letter_name(event: str) -> str:
 
 
 def state_type(letters: Iterable[str]) -> type[StateNode]:
-    """Give the type of states that know these letters; the same one for the same letters."""
+    """Return the type of states that know these letters; the same type for the same letters."""
     return _state_type(tuple(dict.fromkeys(letters)))
 
 
