@@ -1,4 +1,4 @@
-"""The rules of activity as functions over values (rules A3-A6): the effect of received tokens, and what senders pass on.
+"""The rules of activity as functions over values (rules A3-A6): the effect of received tokens, and of sending.
 
 Nothing here depends on nodes, edges or time.
 """
