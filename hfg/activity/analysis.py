@@ -1,9 +1,9 @@
 """The nodes that can ever become active, found without running: a fixed point over active edges (rules A3-A12, G2).
 
-Activity comes from `start`, from edges into a slot `activate`, from feeds, from code that may send its own
-modifiers (A4), and from active nodes over their active edges. Anything uncertain counts as possible. A program outside the graph
-can activate any node, by `run.trigger(slot, activity=+1)`; so each result is only a warning, or a hint if all activity
-may come from outside. Depends on the flat graph and `explicit`.
+Activity comes from `start`, from edges into a slot `activate`, from feeds, from code that may send its own modifiers
+(A4), and from active nodes over their active edges. Anything uncertain counts as possible. A program outside the
+graph can activate any node, by `run.trigger(slot, activity=+1)`; so each result is only a warning, or a hint if all
+activity may come from outside. Depends on the flat graph and `explicit`.
 """
 
 from __future__ import annotations
