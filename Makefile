@@ -14,12 +14,13 @@ RESULTS := benchmarks/results
 PEERS   := .venv-peers
 
 .DEFAULT_GOAL := help
-.PHONY: help demo photographs test lint bench peers bench-peers bench-goals bench-docs bench-links docs docs-nodes docs-drawings docs-mermaid soak setup clean
+.PHONY: help demo photographs test test-fast lint bench peers bench-peers bench-goals bench-docs bench-links docs docs-nodes docs-drawings docs-mermaid soak setup clean
 
 help:
 	@echo "make demo    a robot fetches and delivers cubes; score, video and report in out/fetch_delivery, in less than 3 minutes"
 	@echo "make photographs   search, measure and report on real photographs, watched and controlled"
 	@echo "make test    run all tests (without the long ones)"
+	@echo "make test-fast   run those that take no time, in half a minute"
 	@echo "make lint    ruff, mypy and the check of our English"
 	@echo "make bench   run the benchmarks (bench-peers: with other libraries; bench-docs: write docs/speed.md;"
 	@echo "             bench-goals: the goals, and whether they are reached; bench-links: between processes)"
@@ -40,6 +41,10 @@ photographs: $(READY)
 # Uses one process per core; with a single process: .venv/bin/python -m pytest
 test: $(READY)
 	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
+
+# The tests that are not marked slow, and of each the first cases only: before each commit.
+test-fast: $(READY)
+	$(BIN)/python -m pytest -q --fast --numprocesses auto --dist worksteal
 
 lint: $(READY)
 	$(BIN)/ruff check .

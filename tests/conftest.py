@@ -1,12 +1,16 @@
 """The ordinary suite is the same each time; `make soak` draws examples that nobody has seen.
 
-With `--fuse-after 0` all runs fuse their regions from the first firing on.
+With `--fuse-after 0` all runs fuse their regions from the first firing on. `--fast` takes half a minute: it runs the first
+cases of each test that is not marked `slow`.
 """
 
 from __future__ import annotations
 
+import gc
 import logging
+import os
 import sys
+from collections import Counter
 from collections.abc import Generator
 
 import pytest
@@ -25,6 +29,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--fuse-after", type=int, default=None, help="fuse regions after so many firings of their head; 0: at once"
     )
 
+    parser.addoption("--fast", action="store_true", help="no slow tests, and only the first cases of the others")
+
 
 def pytest_configure(config: pytest.Config) -> None:
     if config.option.fuse_after is not None:
@@ -39,6 +45,47 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         marker = item.get_closest_marker("timeout")
         seconds = marker.args[0] if marker is not None and marker.args else usual
         item.add_marker(pytest.mark.timeout(patience(seconds)), append=False)
+    if config.option.fast:
+        _keep_the_fast(config, items)
+
+
+FIRST_CASES = 2
+LONG_S = 0.25
+
+
+def _keep_the_fast(config: pytest.Config, items: list[pytest.Item]) -> None:
+    cases: Counter[str] = Counter()
+    left_out, kept = [], []
+    for item in items:
+        test = item.nodeid.partition("[")[0]
+        is_slow = item.get_closest_marker("slow") is not None
+        cases[test] += not is_slow
+        (left_out if is_slow or cases[test] > FIRST_CASES else kept).append(item)
+    config.hook.pytest_deselected(items=left_out)
+    items[:] = kept
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
+    """With `--fast`, count the processor time of a test, with that of the processes that it has waited for."""
+    if not item.config.option.fast:
+        return (yield)
+    before = sum(os.times()[:4])
+    try:
+        return (yield)
+    finally:
+        item.user_properties.append(("cpu_s", sum(os.times()[:4]) - before))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name the tests that should have been marked: nothing fails, for the machine may be the reason."""
+    if not terminalreporter.config.option.fast:
+        return
+    reports = [one for one in terminalreporter.getreports("passed") if one.when == "call"]
+    long = [(dict(one.user_properties).get("cpu_s", 0.0), one.nodeid) for one in reports]
+    for seconds, test in sorted(long, reverse=True):
+        if float(str(seconds)) > LONG_S:
+            terminalreporter.write_line(f"{test} took {seconds:.2f} s of processor time: @pytest.mark.slow?")
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -88,3 +135,9 @@ def _modules_are_as_they_were(tmp_path_factory: pytest.TempPathFactory) -> Gener
     for name in set(sys.modules) - loaded:
         if (getattr(sys.modules[name], "__file__", None) or "").startswith(folder):
             del sys.modules[name]
+
+
+def pytest_collection_finish() -> None:
+    """The collector need not look at thousands of tests and their modules again and again: they stay anyway."""
+    gc.collect()
+    gc.freeze()

@@ -77,6 +77,7 @@ def test_marks_within_texts_of_json_are_no_values(monkeypatch: pytest.MonkeyPatc
         json_value(b"[[],[],[" + b" " * 20 + b"]]")
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L4")
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited as on Linux")
 @pytest.mark.parametrize("part", [b"[],", b"[[[]]],", b'{"":[]},', b"{},"])

@@ -81,6 +81,7 @@ class Page:
         del sys.modules[self.module.__name__]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=page_id)
 def test_page_runs_as_written(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -121,6 +122,7 @@ def test_blocks_say_what_they_are(page: Path) -> None:
         assert block.info in known, f"{page_id(page)}:{block.line}: ```{block.info}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=page_id)
 def test_links_inside_the_project_lead_somewhere(page: Path) -> None:
     prose = FENCE.sub("", page.read_text(encoding="utf-8"))

@@ -47,6 +47,7 @@ def named(match: re.Match[str]) -> tuple[Drawn, dict[str, object]]:
     return (drawn if inside is None else drawn[inside].graph), options
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_drawings_are_those_of_their_graphs(page: Path) -> None:
     def drawn(match: re.Match[str]) -> str:

@@ -42,6 +42,7 @@ def test_example_says_what_it_shows(file: Path) -> None:
     assert docstring, f"{example_id(file)} begins with a docstring that says what it shows"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", [*EXAMPLES, *ON_PICTURES], ids=example_id)
 def test_example_has_a_sound_graph(file: Path) -> None:
     checked = hfg("check", str(file), "--json")
@@ -50,6 +51,7 @@ def test_example_has_a_sound_graph(file: Path) -> None:
     assert not alarms, alarms
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", EXAMPLES, ids=example_id)
 def test_example_runs_well_in_virtual_time(file: Path) -> None:
     ran = hfg("run", str(file), "--clock", "virtual", "--until", "600", "--json")

@@ -7,8 +7,9 @@ The table says which floor a module or package stands on; every import statement
 from __future__ import annotations
 
 import ast
+import functools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -133,20 +134,25 @@ def for_types_only(tree: ast.AST) -> set[int]:
     return {line for block in blocks for one in block.body for line in range(one.lineno, (one.end_lineno or 0) + 1)}
 
 
-def imported(module: str, file: Path, *, named: bool = True) -> Iterator[tuple[str, int]]:
-    """Yield the full names of the modules that the file imports, with the line; relative imports are resolved.
+@functools.cache
+def parsed(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
+
+
+@functools.cache
+def imported(module: str, file: Path, *, named: bool = True) -> tuple[tuple[str, int], ...]:
+    """Return the full names of the modules that the file imports, with the line; relative imports are resolved.
 
     Without `named` those are left out that are for type checkers alone.
     """
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
-    tree = ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
+    tree, found = parsed(file), list[tuple[str, int]]()
     left_out = set() if named else for_types_only(tree)
     for statement in ast.walk(tree):
         if getattr(statement, "lineno", 0) in left_out:
             continue
         if isinstance(statement, ast.Import):
-            for alias in statement.names:
-                yield alias.name, statement.lineno
+            found += [(alias.name, statement.lineno) for alias in statement.names]
         elif isinstance(statement, ast.ImportFrom):
             base = statement.module or ""
             if statement.level:
@@ -154,8 +160,8 @@ def imported(module: str, file: Path, *, named: bool = True) -> Iterator[tuple[s
                 base = ".".join([*anchor, base] if base else anchor)
             # `from hfg import graph` imports hfg.graph, `from hfg import Graph` the door
             names = [f"{base}.{alias.name}" for alias in statement.names]
-            for name in {name if name in ALL else base for name in names}:
-                yield name, statement.lineno
+            found += [(name, statement.lineno) for name in {name if name in ALL else base for name in names}]
+    return tuple(found)
 
 
 def violations(module: str, file: Path) -> list[str]:
@@ -182,35 +188,39 @@ def violations(module: str, file: Path) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("module", HFG)
-def test_imports_go_down_only(module: str) -> None:
-    found = violations(module, HFG[module])
-    assert not found, "\n".join(found)
+def test_imports_go_down_only() -> None:
+    for module in HFG:
+        found = violations(module, HFG[module])
+        assert not found, "\n".join(found)
 
 
 IN_WINGS = [(floor, name) for floor in WINGS for name in HFG if name == floor or name.startswith(f"{floor}.")]
 
 
-@pytest.mark.parametrize(("floor", "module"), IN_WINGS)
-def test_imports_between_the_wings_of_a_floor_go_one_way(floor: str, module: str) -> None:
+def test_imports_between_the_wings_of_a_floor_go_one_way() -> None:
     """Also those in functions and for type checkers, so each wing can be read without those that stand on it."""
-    wings = WINGS[floor]
-    wing = home(module, wings)
-    assert wing is not None
-    for name, line in imported(module, HFG[module]):
-        other = home(name, wings)
-        if other is None or other == wing:
-            continue
-        assert wings[other] < wings[wing], f"{module}:{line} imports {name}: {other} stands on {wing} or beside it"
+    for floor, module in IN_WINGS:
+        wings = WINGS[floor]
+        wing = home(module, wings)
+        assert wing is not None
+        for name, line in imported(module, HFG[module]):
+            other = home(name, wings)
+            if other is None or other == wing:
+                continue
+            assert wings[other] < wings[wing], f"{module}:{line} imports {name}: {other} stands on {wing} or beside it"
 
 
-@pytest.mark.parametrize("module", [name for name in HFG if name.startswith("hfg.graph.")])
-def test_what_a_graph_keeps_on_its_nodes_is_written_in_one_place(module: str) -> None:
+def test_what_a_graph_keeps_on_its_nodes_is_written_in_one_place() -> None:
     """A place or options that two modules write are soon two truths; a node's own methods write by `self`."""
-    for one in ast.walk(ast.parse(HFG[module].read_text(encoding="utf-8"))):
-        if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store | ast.Del) and re.match("_[a-z]", one.attr):
-            is_own = isinstance(one.value, ast.Name) and one.value.id == "self"
-            assert is_own or module == "hfg.graph.structure.membership", f"{module}:{one.lineno} writes {one.attr}"
+    for module in [name for name in HFG if name.startswith("hfg.graph.")]:
+        for one in ast.walk(parsed(HFG[module])):
+            if (
+                isinstance(one, ast.Attribute)
+                and isinstance(one.ctx, ast.Store | ast.Del)
+                and re.match("_[a-z]", one.attr)
+            ):
+                is_own = isinstance(one.value, ast.Name) and one.value.id == "self"
+                assert is_own or module == "hfg.graph.structure.membership", f"{module}:{one.lineno} writes {one.attr}"
 
 
 def test_a_circle_that_a_function_hides_is_seen(tmp_path: Path) -> None:
@@ -233,20 +243,22 @@ def test_no_modules_import_each_other_in_a_cycle() -> None:
     assert not circles, "\n".join(" -> ".join([*ring, ring[0]]) for ring in circles)
 
 
-@pytest.mark.parametrize("module", TRANSPORTS)
-def test_transports_see_floors_0_and_1_only(module: str) -> None:
-    for name, line in imported(module, TRANSPORTS[module]):
-        if name.split(".")[0] == "hfg":
-            place = home(name)
-            assert place is not None, f"{module}:{line} imports {name}, which stands on no floor"
-            assert FLOORS[place] <= 1, f"{module}:{line} imports {name} (floor {FLOORS[place]})"
+def test_transports_see_floors_0_and_1_only() -> None:
+    for module in TRANSPORTS:
+        for name, line in imported(module, TRANSPORTS[module]):
+            if name.split(".")[0] == "hfg":
+                place = home(name)
+                assert place is not None, f"{module}:{line} imports {name}, which stands on no floor"
+                assert FLOORS[place] <= 1, f"{module}:{line} imports {name} (floor {FLOORS[place]})"
 
 
-@pytest.mark.parametrize("module", [name for name in HFG if name.startswith("hfg.testing.reference")])
-def test_the_oracle_shares_no_code_with_the_accused(module: str) -> None:
-    for name, line in imported(module, HFG[module]):
-        shared = name.startswith(ORACLE_MUST_NOT_SHARE)
-        assert not shared, f"{module}:{line} imports {name}: an oracle that shares code with the engine proves nothing"
+def test_the_oracle_shares_no_code_with_the_accused() -> None:
+    for module in [name for name in HFG if name.startswith("hfg.testing.reference")]:
+        for name, line in imported(module, HFG[module]):
+            shared = name.startswith(ORACLE_MUST_NOT_SHARE)
+            assert not shared, (
+                f"{module}:{line} imports {name}: an oracle that shares code with the engine proves nothing"
+            )
 
 
 def test_the_table_names_only_what_exists_or_is_planned() -> None:
@@ -277,7 +289,7 @@ def test_the_walk_sees_every_way_to_import(tmp_path: Path, line: str, sentence: 
 
 def fields_of(module: str, name: str) -> set[str]:
     """Give what a class says in `__slots__` that it keeps."""
-    for one in ast.walk(ast.parse(HFG[module].read_text(encoding="utf-8"))):
+    for one in ast.walk(parsed(HFG[module])):
         if isinstance(one, ast.ClassDef) and one.name == name:
             slots = next(part for part in one.body if isinstance(part, ast.Assign) and "__slots__" in ast.unparse(part))
             return set(ast.literal_eval(slots.value))
@@ -293,25 +305,25 @@ HOT = "hfg.engine.fusion.slots"
 """A call of a slot is so short that one more call for each field would cost a tenth of it."""
 
 
-@pytest.mark.parametrize("module", [name for name in HFG if name.startswith("hfg.engine.fusion") and name != HOT])
-def test_fast_paths_change_nodes_by_the_names_of_their_transitions(module: str) -> None:
-    for one in ast.walk(ast.parse(HFG[module].read_text(encoding="utf-8"))):
-        if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store | ast.Del):
-            is_nodes = isinstance(one.value, ast.Name) and one.value.id not in ("self", "core", "edge")
-            assert not (is_nodes and one.attr in WORKERS_FIELDS), (
-                f"{module}:{one.lineno} writes {ast.unparse(one)}: give `Worker` a transition"
-            )
+def test_fast_paths_change_nodes_by_the_names_of_their_transitions() -> None:
+    for module in [name for name in HFG if name.startswith("hfg.engine.fusion") and name != HOT]:
+        for one in ast.walk(parsed(HFG[module])):
+            if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store | ast.Del):
+                is_nodes = isinstance(one.value, ast.Name) and one.value.id not in ("self", "core", "edge")
+                assert not (is_nodes and one.attr in WORKERS_FIELDS), (
+                    f"{module}:{one.lineno} writes {ast.unparse(one)}: give `Worker` a transition"
+                )
 
 
-@pytest.mark.parametrize("module", [name for name in HFG if name.startswith("hfg.engine.rules")])
-def test_the_rules_change_nodes_and_edges_by_the_names_of_their_transitions(module: str) -> None:
+def test_the_rules_change_nodes_and_edges_by_the_names_of_their_transitions() -> None:
     """A field that many modules write is kept in order by none; only listeners count for the edges they stand for."""
-    if module == "hfg.engine.rules.listening":
-        return
-    for one in ast.walk(ast.parse(HFG[module].read_text(encoding="utf-8"))):
-        if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store | ast.Del):
-            is_own = isinstance(one.value, ast.Name) and one.value.id in ("self", "core")
-            foreign = one.attr in WORKERS_FIELDS | EDGES_FIELDS | {"missing"}
-            assert is_own or not foreign, (
-                f"{module}:{one.lineno} writes {ast.unparse(one)}: give its class a transition"
-            )
+    for module in [name for name in HFG if name.startswith("hfg.engine.rules")]:
+        if module == "hfg.engine.rules.listening":
+            continue
+        for one in ast.walk(parsed(HFG[module])):
+            if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store | ast.Del):
+                is_own = isinstance(one.value, ast.Name) and one.value.id in ("self", "core")
+                foreign = one.attr in WORKERS_FIELDS | EDGES_FIELDS | {"missing"}
+                assert is_own or not foreign, (
+                    f"{module}:{one.lineno} writes {ast.unparse(one)}: give its class a transition"
+                )

@@ -23,6 +23,7 @@ def calls() -> Iterator[tuple[str, ast.Call, str]]:
                 yield f"{file.relative_to(TESTS)}:{node.lineno}", node, name
 
 
+@pytest.mark.slow
 def test_no_example_has_a_deadline() -> None:
     assert settings.default is not None
     assert settings.default.deadline is None
@@ -35,6 +36,7 @@ def test_no_example_has_a_deadline() -> None:
     assert given == []
 
 
+@pytest.mark.slow
 def test_other_programs_and_threads_are_waited_for_with_patience() -> None:
     given = [
         where

@@ -27,6 +27,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
         return archive.namelist()
 
 
+@pytest.mark.slow
 def test_wheel_holds_every_module_of_both_packages(wheel: list[str]) -> None:
     for source, package in ((ROOT, "hfg"), (ROOT / "transports", "hfg_transports")):
         for file in (source / package).rglob("*.py"):
@@ -84,6 +85,7 @@ def test_extra_all_holds_every_other_extra() -> None:
     assert set(everything.removeprefix("hfg[").removesuffix("]").split(",")) == extras - {"all"}
 
 
+@pytest.mark.slow
 def test_python_m_hfg_is_the_command() -> None:
     shown = subprocess.run([sys.executable, "-m", "hfg", "--version"], capture_output=True, text=True, check=False)
     assert (shown.returncode, shown.stdout.strip()) == (0, f"hfg {PROJECT['version']}")

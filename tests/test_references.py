@@ -138,6 +138,7 @@ def exists(name: str) -> bool:
     return False
 
 
+@pytest.mark.slow
 def test_rule_numbers_are_those_of_the_rules() -> None:
     dead = [
         f"{prose.at(match)}: {match[1]}"
@@ -148,6 +149,7 @@ def test_rule_numbers_are_those_of_the_rules() -> None:
     assert not dead, "no such rule in docs/semantics.md: " + ", ".join(dead)
 
 
+@pytest.mark.slow
 def test_rule_numbers_in_messages_are_those_of_the_rules() -> None:
     dead = [
         f"{message.at(match)}: {number}"
@@ -161,6 +163,7 @@ def test_rule_numbers_in_messages_are_those_of_the_rules() -> None:
     assert not dead, "no such rule in docs/semantics.md: " + ", ".join(dead)
 
 
+@pytest.mark.slow
 def test_files_that_are_named_exist() -> None:
     dead = [
         f"{prose.at(match)}: {match[1]}"

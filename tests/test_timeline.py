@@ -153,6 +153,7 @@ def test_signals_are_arrows_from_the_box_that_sent_them_to_the_one_that_took_the
     assert all(end["bp"] == "e" for end in ends)
 
 
+@pytest.mark.slow
 def test_activity_has_rows_of_its_own() -> None:
     events = timeline(build())
     names = rows(events, 2)

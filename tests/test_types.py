@@ -361,6 +361,7 @@ _HINTS: st.SearchStrategy[Any] = st.recursive(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.rule("P3")
 @given(_HINTS, _HINTS)
 @example(list[int], Sequence[int])
@@ -374,6 +375,7 @@ def test_what_beartype_says_is_a_subtype_fits(source: Any, target: Any) -> None:
     assert compatible(source, target) or not is_subtype
 
 
+@pytest.mark.slow
 @pytest.mark.rule("P3")
 @given(st.data())
 @settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])

@@ -225,6 +225,7 @@ def became_active(trace: list[TraceEvent]) -> set[str]:
     return had
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A1", "A3")
 @pytest.mark.parametrize("block", range(4))
 def test_whoever_becomes_active_in_a_run_was_expected_to(block: int, monkeypatch: pytest.MonkeyPatch) -> None:

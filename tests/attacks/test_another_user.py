@@ -255,6 +255,7 @@ def test_none_of_them_has_failed_meanwhile(victims: Victims) -> None:
 # --- places that the other user has made first
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["folder", "link", "link to a folder of mine", "open folder"])
 def test_a_place_that_another_user_has_made_first_is_refused_in_a_sentence(how: str) -> None:
     folder = Path(tempfile.mkdtemp(prefix="hfg-attack-", dir="/tmp"))
@@ -292,6 +293,7 @@ def test_a_place_that_another_user_has_made_first_is_refused_in_a_sentence(how: 
         shutil.rmtree(folder, ignore_errors=True)
 
 
+@pytest.mark.slow
 def test_a_run_of_another_user_is_another_world(victims: Victims) -> None:
     """He may use hfg himself; the two do not meet."""
     place = Path(tempfile.mkdtemp(prefix="hfg-attack-", dir="/tmp"))

@@ -36,6 +36,7 @@ FIRST = int(os.environ.get("HFG_SOAK_SEED", "1000000"))
 BLOCK = 2000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", OWN)
 def test_a_damaged_file_is_read_or_refused_with_a_sentence(kind: str, tmp_path: Path) -> None:
     wrong = {seed: trial(kind, seed, tmp_path) for seed in (*SEEDS.get(kind, ()), *range(FEW))}
@@ -60,6 +61,7 @@ def in_a_process(kind: str, first: int, count: int, folder: Path) -> list[object
     return wrong
 
 
+@pytest.mark.slow
 def test_foreign_code_survives_damaged_files(tmp_path: Path) -> None:
     assert in_a_process(",".join(NATIVE), 0, 40, tmp_path) == []
 
@@ -92,6 +94,7 @@ def test_a_cascade_that_leads_out_of_the_window_or_its_tables_is_refused(kind: i
         _structured.cascade_of(good.replace(old, new))
 
 
+@pytest.mark.slow
 def test_a_file_that_kills_the_process_that_tries_it_is_refused(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -106,6 +109,7 @@ def test_a_file_that_kills_the_process_that_tries_it_is_refused(
         model_of(good, "it")
 
 
+@pytest.mark.slow
 def test_the_cascade_of_a_user_is_tried_first(tmp_path: Path) -> None:
     place = tmp_path / "a.xml"
     place.write_bytes(KINDS["cascade"].samples()[1])

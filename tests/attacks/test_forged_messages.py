@@ -144,16 +144,19 @@ def test_an_introduction_whose_text_is_cut_off_is_none() -> None:
     assert read_introduction(b"\x96\x01\xa2a\xd7\xa1b\xc3\xa0\xa0") is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_forged_frames_are_read_or_refused(seed: int) -> None:
     assert 3_000 > fuzz_frames(3_000, seed) - 3_000 > 300  # each is refused by one of the two ends, some by both
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_forged_frames_break_neither_end_of_a_link(seed: int) -> None:
     assert fuzz_machines(1_000, seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_forged_messages_are_read_or_refused(seed: int) -> None:
     assert 3_000 > fuzz_messages(3_000, seed) > 300

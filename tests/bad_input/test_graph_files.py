@@ -493,6 +493,7 @@ def test_an_unknown_type_keeps_its_place_with_its_data(capsys: pytest.CaptureFix
 # --- disks ---
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_the_old_file_whole() -> None:
     """A process may write no more than a few bytes into a file, as on a full disk."""
     path = write("as before")

@@ -114,6 +114,7 @@ def outcomes() -> Iterator[dict[tuple[str, int], Future[Ended]]]:
         yield {(where, presses): pool.submit(interrupted, where, presses) for presses in (1, 2) for where in PLACES}
 
 
+@pytest.mark.slow
 @pytest.mark.rule("X3")
 @pytest.mark.parametrize("where", PLACES)
 def test_one_press_tears_down_and_ends_with_a_sentence(
@@ -127,6 +128,7 @@ def test_one_press_tears_down_and_ends_with_a_sentence(
     assert "down" in ended.said
 
 
+@pytest.mark.slow
 @pytest.mark.rule("X3")
 @pytest.mark.parametrize("where", PLACES)
 def test_a_second_press_ends_at_once(where: str, outcomes: dict[tuple[str, int], Future[Ended]]) -> None:
@@ -138,6 +140,7 @@ def test_a_second_press_ends_at_once(where: str, outcomes: dict[tuple[str, int],
     assert ended.said[-1] == "after None"
 
 
+@pytest.mark.slow
 def test_a_thread_that_is_left_behind_is_named(outcomes: dict[tuple[str, int], Future[Ended]]) -> None:
     assert (
         'node "blocks" failed in slot begin, call 1: its thread did not come back'

@@ -30,6 +30,8 @@ from hfg.testing import diagrams, explore, fire, reference_run
 from hfg.trace import TraceEvent
 from tests.cli.conftest import STEPS, Command, command
 
+pytestmark = pytest.mark.slow
+
 __all__ = ["command"]  # a fixture
 
 OURS = str(Path(hfg.__file__).parent)

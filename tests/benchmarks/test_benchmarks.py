@@ -37,6 +37,7 @@ def cases() -> Iterator[tuple[str, str]]:
                 yield name, case
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("suite", "case"), list(cases()))
 def test_every_case_runs_at_a_tiny_size(suite: str, case: str) -> None:
     figures = MODULES[suite].CASES[case].run(TOKENS if suite != "bench_threads" else 2)
@@ -64,6 +65,7 @@ def test_every_goal_has_its_cases_or_the_reason_why_not(suite: Any) -> None:
             assert (side.case in suite.CASES) != (side.case in suite.SKIPPED), side.case
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "case",
     [
@@ -106,6 +108,7 @@ def test_rates_and_ages_and_losses_stand_in_one_cell() -> None:
     assert page.arrival(rate) == "66,667 (67%), 300 µs old; 50.0 % lost"
 
 
+@pytest.mark.slow
 def test_the_camera_finds_the_same_in_groups_as_by_hand() -> None:
     grouped: list[Any] = []
     alone: list[Any] = []
@@ -143,6 +146,7 @@ def test_the_table_of_goals_names_what_was_not_measured() -> None:
     assert text[4].strip() == "1 of 2 goals reached; 1 not measured"
 
 
+@pytest.mark.slow
 def test_another_checkout_is_measured_in_turn() -> None:
     case = bench_goals.AGAINST[1]
     said: list[str] = []
@@ -166,6 +170,7 @@ def test_what_is_complete_counts_when_somebody_interrupts(monkeypatch: pytest.Mo
     assert {record.case: record.values for record in records} == {cases[0]: [1.0], cases[1]: [2.0]}
 
 
+@pytest.mark.slow
 def test_a_folder_without_hfg_is_not_measured(tmp_path: Path) -> None:
     failed: dict[str, str] = {}
     said: list[str] = []
@@ -175,11 +180,13 @@ def test_a_folder_without_hfg_is_not_measured(tmp_path: Path) -> None:
     assert "there is no hfg in" in failed[BEFORE + case]
 
 
+@pytest.mark.slow
 def test_a_case_is_measured_by_a_process_of_its_own() -> None:
     figures = one("bench_shape", "build and check | 100")
     assert figures["wall"] > 0
 
 
+@pytest.mark.slow
 def test_a_case_that_fails_says_which_and_why() -> None:
     with pytest.raises(RuntimeError, match=r"(?s)bench_nothing: a case failed:.*ModuleNotFoundError"):
         one("bench_nothing", "a case")

@@ -139,6 +139,7 @@ def test_a_named_module_that_is_not_there_is_a_problem_too() -> None:
     assert types_of("no.such.module").problems[0].startswith('there is no module "no.such.module"')
 
 
+@pytest.mark.slow
 def test_the_library_is_offered_first_and_is_sound() -> None:
     assert offers()[0] == Offer("hfg.nodes")
     found = types_of("hfg.nodes")
@@ -147,6 +148,7 @@ def test_the_library_is_offered_first_and_is_sound() -> None:
     assert all(find(one.reference)._type.reference == one.reference for one in found.types)
 
 
+@pytest.mark.slow
 def test_to_say_where_types_may_be_imports_no_family() -> None:
     code = (
         "import sys; from hfg.catalogue import offers; assert offers()[0].module == 'hfg.nodes'; "

@@ -21,6 +21,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {file.name: file.read_text(encoding="utf-8") for file in folder.glob("*.md")}
 
 
+@pytest.mark.slow
 def test_the_pages_are_up_to_date(written: dict[str, str]) -> None:
     old = [name for name, text in written.items() if _is_comparable(name) and _on_disk(name) != text]
     gone = sorted(file.name for file in FOLDER.glob("*.md") if file.name not in written)
@@ -38,6 +39,7 @@ def _is_comparable(name: str) -> bool:
     return all(made_with(family) in _on_disk(f"{family}.md") or not _on_disk(f"{family}.md") for family in generated)
 
 
+@pytest.mark.slow
 def test_they_are_the_same_each_time(written: dict[str, str]) -> None:
     assert pages() == pages()
     assert " at 0x" not in "".join(written.values())
@@ -60,6 +62,7 @@ def test_a_page_has_all_that_is_known_of_a_type(written: dict[str, str]) -> None
     assert "[Hysteresis](logic.md#hysteresis)" in written["index.md"]
 
 
+@pytest.mark.slow
 def test_they_are_written_where_one_says_and_old_ones_go(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "gone.md").write_text("of a family that is no more")
     assert main([str(tmp_path)]) == 0

@@ -51,6 +51,7 @@ def missed(library: Index, queries: Sequence[tuple[str, frozenset[str]]]) -> lis
     return [f"{words}: {answers[words]}" for words, meant in queries if not meant & set(answers[words])]
 
 
+@pytest.mark.slow
 def test_of_a_hundred_searches_at_least_95_have_what_is_meant_among_the_first_three(library: Index) -> None:
     assert len(QUERIES) + len(HELD_OUT) == 100
     wrong = missed(library, QUERIES + HELD_OUT)

@@ -384,6 +384,7 @@ def test_closed_streams_are_no_trouble(hfg: Command, monkeypatch: pytest.MonkeyP
         assert main(["run", TARGET, *VIRTUAL]) == 0
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_gone_ends_the_command_quietly(hfg: Command) -> None:
     writes = [sys.executable, "-m", "hfg", "nodes", "halves.py"]
     with subprocess.Popen(writes, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:

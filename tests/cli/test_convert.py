@@ -33,6 +33,7 @@ def test_a_parameter_of_a_graph_file_is_set_for_a_run(command: Command) -> None:
     assert "step 2" not in shown.out
 
 
+@pytest.mark.slow
 def test_the_schema_is_written(command: Command) -> None:
     assert command("convert", "--schema").out == schema(types=True)
     assert command("convert", "--schema", "graph.schema.json").code == 0

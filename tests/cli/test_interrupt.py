@@ -106,6 +106,7 @@ def process(tmp_path: Path) -> Iterator[Process]:
     process.kill()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clock", ["real", "virtual"])
 def test_a_node_that_waits_is_cancelled_and_torn_down(process: Process, clock: str) -> None:
     process.run_node("await asyncio.Event().wait()", "--clock", clock)
@@ -116,6 +117,7 @@ def test_a_node_that_waits_is_cancelled_and_torn_down(process: Process, clock: s
     assert "Traceback" not in err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", ["time.sleep(1e6)", "while True: pass", "threading.Event().wait()"])
 def test_a_node_that_blocks_the_loop_is_broken_into(process: Process, code: str) -> None:
     process.run_node(code)
@@ -126,6 +128,7 @@ def test_a_node_that_blocks_the_loop_is_broken_into(process: Process, code: str)
     assert "interrupted" in err
 
 
+@pytest.mark.slow
 def test_a_thread_that_does_not_come_back_is_left_behind(process: Process) -> None:
     process.run_node("time.sleep(1e6)", group="thread")
     process.interrupt()
@@ -134,6 +137,7 @@ def test_a_thread_that_does_not_come_back_is_left_behind(process: Process) -> No
     assert "interrupted" in err
 
 
+@pytest.mark.slow
 def test_a_teardown_that_does_not_end_in_time_is_named(process: Process) -> None:
     code = GRAPH.format(code="await asyncio.Event().wait()", group="loop", prefix="async ")
     process.run(code.replace("def teardown(self) -> None: ", "async def teardown(self): await asyncio.sleep(1e6); "))
@@ -144,6 +148,7 @@ def test_a_teardown_that_does_not_end_in_time_is_named(process: Process) -> None
     assert "interrupted" in err
 
 
+@pytest.mark.slow
 def test_second_interrupt_ends_at_once(process: Process) -> None:
     process.run_node("time.sleep(1e6)", group="thread")
     process.interrupt()
@@ -157,6 +162,7 @@ def test_second_interrupt_ends_at_once(process: Process) -> None:
 WAITS = "import threading\nprint('begun', flush=True)\nthreading.Event().wait()\n"
 
 
+@pytest.mark.slow
 def test_interrupt_while_the_target_is_imported(process: Process) -> None:
     process.run(WAITS)
     process.interrupt()
@@ -164,6 +170,7 @@ def test_interrupt_while_the_target_is_imported(process: Process) -> None:
     assert (code, err) == (1, "hfg: interrupted\n")
 
 
+@pytest.mark.slow
 def test_interrupt_while_the_graph_is_built(process: Process) -> None:
     process.run("import hfg\n\n\ndef build() -> hfg.Graph:\n" + textwrap.indent(WAITS, "    "))
     process.interrupt()
@@ -171,6 +178,7 @@ def test_interrupt_while_the_graph_is_built(process: Process) -> None:
     assert (code, err) == (1, "hfg: interrupted\n")
 
 
+@pytest.mark.slow
 def test_interrupt_while_hfg_itself_is_imported(
     process: Process, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -203,6 +211,7 @@ def test_only_the_command_takes_the_signal_while_it_is_imported(
     assert is_command() is is_ours
 
 
+@pytest.mark.slow
 def test_the_trace_is_whole_after_an_interrupt(process: Process, tmp_path: Path) -> None:
     trace = tmp_path / "run.trace.jsonl"
     process.run_node("await asyncio.Event().wait()", "--trace", str(trace))
@@ -213,6 +222,7 @@ def test_the_trace_is_whole_after_an_interrupt(process: Process, tmp_path: Path)
     assert '"RunEnded"' in lines[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", ["await asyncio.sleep(1e6)", "while True: pass"], ids=["waits", "does not wait"])
 def test_the_page_of_an_interrupted_run_has_what_was_seen(process: Process, tmp_path: Path, code: str) -> None:
     page = tmp_path / "run.html"

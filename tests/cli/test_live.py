@@ -194,6 +194,7 @@ def terminals() -> Iterator[list[Terminal]]:
         one.close()
 
 
+@pytest.mark.slow
 def test_on_a_terminal_a_table_is_drawn_and_ctrl_c_leaves_none_of_it(folder: Path, terminals: list[Terminal]) -> None:
     terminal = Terminal(folder, "run", "steps.py:build")
     terminals.append(terminal)
@@ -209,6 +210,7 @@ def test_on_a_terminal_a_table_is_drawn_and_ctrl_c_leaves_none_of_it(folder: Pat
     assert (folder / "torn down").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["terminated", "terminal gone"])
 def test_a_process_that_is_to_end_tears_down(folder: Path, terminals: list[Terminal], way: str) -> None:
     terminal = Terminal(folder, "run", "steps.py:build")
@@ -223,6 +225,7 @@ def test_a_process_that_is_to_end_tears_down(folder: Path, terminals: list[Termi
     assert (folder / "torn down").exists()
 
 
+@pytest.mark.slow
 def test_a_dumb_terminal_has_no_table(folder: Path, terminals: list[Terminal]) -> None:
     terminal = Terminal(folder, "run", "steps.py:build", "--until", "0.3", TERM="dumb")
     terminals.append(terminal)

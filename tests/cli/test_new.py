@@ -24,6 +24,7 @@ def test_new_files_say_what_comes_next(command: Command) -> None:
     assert command("run", "robot.py", "--clock", "virtual").code == 0
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)  # without a cache mypy reads numpy and reactivex first
 def test_new_files_pass_mypy_strict_ruff_and_their_own_tests(command: Command, tmp_path: Path) -> None:
     for kind, name in (("node", "find_a_rather_long_name_of_forty_letters"), ("graph", "robot.py")):

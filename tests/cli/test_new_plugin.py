@@ -53,6 +53,7 @@ def test_the_package_installs_is_found_and_passes_its_test(command: Command, tmp
     assert "no errors" in run([*hfg, "check", "robot.hfg.yaml"], elsewhere, site)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)  # without a cache mypy reads numpy and reactivex first
 def test_what_is_written_passes_mypy_strict_and_ruff(command: Command, tmp_path: Path) -> None:
     assert command("new", "plugin", "a_rather_long_name_of_forty_letters_each").code == 0

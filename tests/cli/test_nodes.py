@@ -137,6 +137,7 @@ def test_words_and_categories_choose(lamps: Command) -> None:
     assert json.loads(lamps("nodes", "lamps", "--json", "-s", "zebra").out) == []
 
 
+@pytest.mark.slow
 def test_a_search_of_all_that_is_installed_lists_the_best_first(command: Command) -> None:
     shown = command("nodes", "--search", "webcam")
     assert (shown.code, shown.err) == (0, "")
@@ -149,6 +150,7 @@ def test_a_search_of_all_that_is_installed_lists_the_best_first(command: Command
     assert command("nodes", "--search", "webcam", "-c", "zebra").code == 2
 
 
+@pytest.mark.slow
 def test_a_family_and_a_type_of_the_library_have_short_names(command: Command) -> None:
     family = command("nodes", "logic").out
     assert family.startswith("logic (")
@@ -181,12 +183,14 @@ def test_without_a_module_all_that_is_installed_is_listed_and_what_is_broken_tol
     assert command("nodes", "dim").out.startswith("here:dim")
 
 
+@pytest.mark.slow
 def test_a_module_without_any_says_so(command: Command) -> None:
     Path("empty.py").write_text("", encoding="utf-8")
     assert command("nodes", "empty.py") == Shown(0, "no node types in empty.py\n", "")
     assert command("nodes", "select") == Shown(0, "no node types in select\n", "")  # a module of Python's own
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

@@ -8,7 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.limits import patience
+
+pytestmark = pytest.mark.slow
 
 LOUD = """
 import logging

@@ -170,6 +170,7 @@ def test_a_run_that_blocks_its_loop_is_waited_for(command: Command, monkeypatch:
         assert answer.glance is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "question", [b"nonsense\n", b'{"want":"everything"}\n', b'{"want":"name","more":1}\n', b"[]\n", b"\xff\n"]
 )

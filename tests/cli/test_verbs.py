@@ -24,6 +24,7 @@ def test_a_verb_says_the_same_in_the_list_and_of_itself(name: str, command: Call
     assert " ".join(said.split())[:40] in " ".join(shown.out.split())
 
 
+@pytest.mark.slow
 def test_the_list_of_verbs_imports_none_of_them() -> None:
     code = """if True:
         import sys

@@ -245,6 +245,7 @@ graph.add(lines(){rate})
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="pipes are others elsewhere")
 @pytest.mark.parametrize("flush", ["", ", flush=True"])
 def test_whoever_reads_may_have_enough(tmp_path: Path, flush: str) -> None:

@@ -127,6 +127,7 @@ VALUES = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(VALUES)
 def test_any_data_comes_back_unchanged_from_json(value: Any) -> None:
     text = json.dumps(encode(value), allow_nan=False)

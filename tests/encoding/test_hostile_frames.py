@@ -98,6 +98,7 @@ def test_what_is_cut_anywhere_is_refused(number: int) -> None:
     assert refused(codec, metadata + b"\0", value)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L4")
 @pytest.mark.parametrize("number", range(len(SAMPLES)))
 def test_flipped_bits_are_refused_or_are_values_of_the_type(number: int) -> None:

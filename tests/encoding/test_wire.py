@@ -421,6 +421,7 @@ def test_too_much_is_refused_by_the_sender() -> None:
 # --- what two ends compare ---
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L4")
 def test_equal_types_have_equal_fingerprints_in_every_process() -> None:
     names = ["int | str | None", "str | None | int", "dict[str, list[float]]", "Literal['b', 1, 'a']"]
@@ -464,6 +465,7 @@ def test_a_difference_is_told_in_words(mine: Any, theirs: Any, sentence: str) ->
     assert difference(mine, description_of(mine)) is None
 
 
+@pytest.mark.slow
 @given(st.recursive(st.none() | st.text(max_size=5) | st.integers(), lambda inner: st.lists(inner, max_size=4)))
 def test_what_is_no_description_is_refused(data: Any) -> None:
     for hint in (Pose, tuple[int, str], dict[str, list[int]]):

@@ -109,6 +109,7 @@ def trace_hash(**options: Any) -> str:
     return hashlib.sha256(b"\n".join(msgspec.json.encode(event, enc_hook=repr) for event in events)).hexdigest()[:16]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R6")
 def test_twenty_runs_in_virtual_time_leave_the_same_trace_on_every_python() -> None:
     assert {trace_hash() for _ in range(20)} == {EXPECTED}

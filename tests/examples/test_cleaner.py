@@ -28,6 +28,7 @@ def states_without_hfg(seed: int) -> Timeline:
     return [(round(now, 6), state) for now, state in mission.timeline if state != "clean"]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A3", "A5", "A11", "A12", "A13")
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("by_letters", [False, True])
@@ -35,6 +36,7 @@ def test_the_room_is_cleaned_in_the_same_way(by_letters: bool, seed: int) -> Non
     assert states_of(cleaner.build(seed, by_letters)) == states_without_hfg(seed)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A12")
 def test_who_does_not_find_home_aborts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cleaner, "AT_HOME", -1.0)

@@ -155,6 +155,7 @@ def watched(graph: hfg.Graph, *, until_s: float | None = None, trace: Recorder |
 # --- Under every schedule.
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A3", "A5", "A6", "F9", "R6")
 def test_the_mission_is_the_same_under_fifty_schedules() -> None:
     found = explore(partial(mission.build, cubes=(4,)), runs=50, invariants=OURS, result=story, debug=False)
@@ -187,6 +188,7 @@ def test_whatever_goes_wrong_the_oracle_permits_every_move(name: str) -> None:
 # --- What it does.
 
 
+@pytest.mark.slow
 def test_two_cubes_are_delivered_and_the_robot_is_home_again() -> None:
     trace = watched(mission.build())
     assert trace.outcome == "stopped"
@@ -219,6 +221,7 @@ def test_a_lamp_that_nobody_heeds_is_shown_again_until_the_third_time() -> None:
     assert home(trace)
 
 
+@pytest.mark.slow
 def test_after_three_tries_the_robot_goes_on_to_the_next_station() -> None:
     trace = watched(mission.build(cubes=(2, 4), ignored=3))
     assert steps(trace).count("fetch/tries") == 5  # three times, giving up, and once at the next
@@ -226,6 +229,7 @@ def test_after_three_tries_the_robot_goes_on_to_the_next_station() -> None:
     assert home(trace)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A12")
 def test_a_drive_that_is_blocked_times_out_and_is_tried_again() -> None:
     trace = watched(mission.build(cubes=(2,), stuck_s=(15.0, 45.0)))
@@ -234,6 +238,7 @@ def test_a_drive_that_is_blocked_times_out_and_is_tried_again() -> None:
     assert home(trace)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A10", "A12")
 def test_wheels_that_stay_blocked_end_the_mission_in_failure() -> None:
     trace = Recorder()
@@ -262,6 +267,7 @@ def test_abort_ends_the_mission_whatever_is_active() -> None:
     assert trace.active_at_end() == ["fetch/wait"]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A3")
 def test_a_start_that_never_comes_leaves_the_robot_where_it_is() -> None:
     graph = mission.build()
@@ -273,6 +279,7 @@ def test_a_start_that_never_comes_leaves_the_robot_where_it_is() -> None:
     assert not [call for call in trace.of(CallStarted) if call.slot == "drive"]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A3")
 def test_a_start_that_comes_again_changes_nothing() -> None:
     graph = mission.build(cubes=(2,))
@@ -280,6 +287,7 @@ def test_a_start_that_comes_again_changes_nothing() -> None:
     assert steps(watched(graph)) == steps(watched(mission.build(cubes=(2,))))
 
 
+@pytest.mark.slow
 def test_somebody_outside_can_send_the_robot_off() -> None:
     """`running` holds the run open, so the driver has all the time it wants."""
     graph = mission.build(cubes=(2,))

@@ -10,6 +10,8 @@ import pytest
 from examples import photographs
 from hfg.trace import ActivityChanged, FiringStarted, ParameterSet, TraceEvent
 
+pytestmark = pytest.mark.slow
+
 EVERYTHING = {"coins": (24, 0), "page": (0, 7)}
 
 

@@ -68,6 +68,7 @@ def test_the_file_is_the_graph_that_the_code_builds(name: str) -> None:
     assert (FOLDER / f"{name}.hfg.yaml").read_text(encoding="utf-8") == text_of(describe(code(name)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_code_and_file_say_the_same_and_write_the_same(name: str) -> None:
     said, written = of_code(name)
@@ -76,6 +77,7 @@ def test_code_and_file_say_the_same_and_write_the_same(name: str) -> None:
     assert results(file(name)) == (said, written)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command", [["coins.py"], ["-m", "hfg", "run", "--allow", "coins", "coins.hfg.yaml"]], ids=["python", "hfg run"]
 )
@@ -144,6 +146,7 @@ def test_a_rendered_plane_has_the_disparity_that_it_was_drawn_with(method: str, 
 # --- codes ---
 
 
+@pytest.mark.slow
 def test_both_codes_are_read_at_every_angle_and_nothing_else() -> None:
     said, written = of_code("codes")
     assert said.splitlines() == [f"{5 * number:3} degrees: bar code and QR code" for number in range(19)]
@@ -161,6 +164,7 @@ def test_a_number_that_is_no_articles_is_refused() -> None:
 # --- pedestrians ---
 
 
+@pytest.mark.slow
 def test_without_the_video_a_photograph_is_searched_and_it_is_said_how_to_get_it(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -428,6 +428,7 @@ def test_error_of_the_block_comes_out_as_it_is(fetch: Fetch, drive: Any) -> None
     drive(main())
 
 
+@pytest.mark.slow
 def test_whole_program_in_virtual_time() -> None:
     async def main() -> float:
         start = hfg.now()

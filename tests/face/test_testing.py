@@ -82,10 +82,12 @@ def test_fire_runs_one_node_without_a_graph() -> None:
     assert fire(MapLookup(), key=3, map={3: Pose(1.0)}).outputs == {"pose": Pose(1.0)}
 
 
+@pytest.mark.slow
 def test_explore_takes_the_function_that_builds_the_graph() -> None:
     explore(build_graph)
 
 
+@pytest.mark.slow
 def test_explore_gives_the_smallest_failure_of_a_graph_that_leans_on_an_order() -> None:
     with pytest.raises(AssertionError) as error:
         explore(build_hasty_graph)

@@ -119,6 +119,7 @@ def test_every_real_file_is_imported_whole_and_runs_unless_it_needs_ros(name: st
         assert hfg.run(graph, clock="virtual", until_s=0.1).outcome == ("until" if report.nodes else "done")
 
 
+@pytest.mark.slow
 def test_the_real_classifier_learns_and_classifies(tmp_path: Path) -> None:
     if not REAL.is_dir():
         pytest.skip("the files of CS::APEX are not here")

@@ -38,6 +38,7 @@ def smallest(plan: GraphPlan, seed: int, folder: Path) -> str:
     return f"{small}\n{difference(small, seed, folder / 'graph.hfg.yaml')}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("block", range(10))
 def test_random_graphs_come_back_as_they_are(block: int, tmp_path: Path) -> None:
     """By their text and by everything that happens in a run under one schedule."""
@@ -282,6 +283,7 @@ SET: dict[str, Any] = {
 """Of `Every`, other values than the defaults."""
 
 
+@pytest.mark.slow
 def test_a_subgraph_without_a_type_keeps_everything_that_is_said_of_its_parameters() -> None:
     body = {name: Every.__dict__[name] for name in SET} | {"build": Every.build}
     local: type[hfg.Subgraph] = type("Local", (hfg.Subgraph,), body)
@@ -339,6 +341,7 @@ def test_saving_changes_nothing_and_may_be_done_while_it_runs(tmp_path: Path) ->
     graph.undo()
 
 
+@pytest.mark.slow
 def test_random_graphs_have_parameters_of_every_kind_that_are_set() -> None:
     """And a plan prints as the program that sets them."""
     plans = [plan for seed in range(0, 60, 3) if (plan := plan_of(seed)) is not None]

@@ -71,6 +71,7 @@ def read_back(text: str) -> Any:
     return None if found is None else plain(found)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.dictionaries(TEXTS, DATA, min_size=1, max_size=4))
 def test_what_is_written_is_read_the_same_by_every_reader(data: dict[str, Any]) -> None:
@@ -124,6 +125,7 @@ def valid(text: str) -> bool:
     return checker.is_valid(found)
 
 
+@pytest.mark.slow
 def test_every_file_that_is_written_keeps_the_schema() -> None:
     jsonschema.Draft202012Validator.check_schema(json.loads(schema()))
     for seed in range(40):

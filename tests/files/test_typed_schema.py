@@ -34,6 +34,7 @@ def complaints(text: str) -> list[str]:
     return [error.message for error in checker.iter_errors(yaml.safe_load(text))]
 
 
+@pytest.mark.slow
 def test_it_is_a_schema_and_knows_all_types_that_are_installed() -> None:
     jsonschema.Draft202012Validator.check_schema(known())
     offered = known()["$defs"]["NodeDocument"]["properties"]["type"]["anyOf"]
@@ -41,6 +42,7 @@ def test_it_is_a_schema_and_knows_all_types_that_are_installed() -> None:
     assert all(one["description"] for one in offered[:-1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.name))
 def test_each_example_keeps_it(file: Path) -> None:
     assert complaints(file.read_text(encoding="utf-8")) == []
@@ -56,6 +58,7 @@ def defaults() -> Iterator[tuple[str, Any, Any]]:
                 yield f"{one.reference} {said.name}", part[said.name], kind.parameters[said.name]
 
 
+@pytest.mark.slow
 def test_it_accepts_the_default_of_each_parameter() -> None:
     count = 0
     for where, part, spec in defaults():
@@ -102,6 +105,7 @@ def test_types_that_it_does_not_know_are_left_to_the_loader() -> None:
     assert complaints("hfg: 1\nnodes:\n  a: {type: 'my_robot.nodes:Arm', parameters: {gain: 3}}\n") == []
 
 
+@pytest.mark.slow
 def test_a_package_of_ones_own_is_known_where_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "my_arm.py").write_text(ARM)
     monkeypatch.syspath_prepend(tmp_path)

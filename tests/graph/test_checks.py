@@ -419,12 +419,14 @@ def chain(length: int) -> Graph:
     return graph
 
 
+@pytest.mark.slow
 def test_chain_of_five_thousand_does_not_recurse() -> None:
     graph = chain(5_000)
     assert graph.check() == []
     assert len(flatten(graph).edges) == 4_999
 
 
+@pytest.mark.slow
 def test_ring_of_five_thousand_is_found() -> None:
     graph = Graph()
     nodes = [graph.add(Need()) for _ in range(5_000)]
@@ -435,6 +437,7 @@ def test_ring_of_five_thousand_is_found() -> None:
     assert "need -> need_2 -> need_3 -> need_4 -> need_5 -> need_6 -> 4993 more -> need_5000 -> need" in problem.what
 
 
+@pytest.mark.slow
 def test_node_with_its_edge_costs_less_than_three_kilobytes() -> None:
     """Node, ports, edge, and both once more in the flat graph; measured 1.1 to 1.4 kB."""
     length = 1_000

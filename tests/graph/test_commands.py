@@ -223,6 +223,7 @@ def ends(graph: hfg.Graph) -> dict[object, list[object]]:
 # --- properties ---
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R4")
 @pytest.mark.parametrize("block", range(10))
 def test_any_sequence_is_undone_redone_and_replayed_exactly(block: int) -> None:
@@ -262,6 +263,7 @@ def walk(seed: int, *, edits: int) -> None:
 # --- a graph as commands ---
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R4")
 @pytest.mark.parametrize("block", range(10))
 def test_the_commands_of_a_graph_make_it_again_and_are_those_of_what_they_made(block: int) -> None:

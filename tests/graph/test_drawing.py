@@ -171,6 +171,7 @@ def test_no_name_breaks_the_drawing(name: str) -> None:
     check_text(name)
 
 
+@pytest.mark.slow
 @given(st.text(min_size=1).filter(lambda name: not set(name) & set("/.") and name_problem(name) is None))
 def test_no_text_at_all_breaks_the_drawing(name: str) -> None:
     check_text(name)

@@ -15,6 +15,8 @@ import hfg
 from hfg.graph import Graph, Subgraph
 from hfg.graph.flat import FlatGraph, flatten
 
+pytestmark = pytest.mark.slow
+
 Where = tuple[int, ...]  # the boxes around a node, the outermost first
 LABEL = "box_{}"
 

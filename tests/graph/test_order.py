@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -45,6 +46,7 @@ def reachable(successors: list[list[int]], start: int) -> set[int]:
     return found
 
 
+@pytest.mark.slow
 @given(graphs())
 def test_nodes_of_one_part_reach_each_other_and_nobody_else_back(successors: list[list[int]]) -> None:
     behind = [reachable(successors, node) for node in range(len(successors))]
@@ -60,6 +62,7 @@ def test_nodes_of_one_part_reach_each_other_and_nobody_else_back(successors: lis
     ]
 
 
+@pytest.mark.slow
 @given(graphs())
 def test_shortest_ring_is_a_ring(successors: list[list[int]]) -> None:
     for part in rings(successors):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hfg.graph.structure.sequence import Sequence
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.sampled_from(["insert", "remove", "replace"]), st.integers(0, 50)), max_size=60))
 def test_it_does_what_a_list_does(steps: list[tuple[str, int]]) -> None:
     sequence, plain, fresh = Sequence(range(-5, 0)), list(range(-5, 0)), iter(range(1000))

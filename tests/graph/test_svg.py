@@ -232,6 +232,7 @@ def test_a_subgraph_is_a_box_around_what_lies_in_it_at_any_depth() -> None:
             assert one.y + one.height < around.y + around.height
 
 
+@pytest.mark.slow
 def test_subgraphs_can_be_folded_by_depth_or_by_name() -> None:
     graph = mission()
     assert paths(graph.draw(format="svg", depth=0)) == {"camera", "blur", "fetch", "nest", "find", "show"}
@@ -330,6 +331,7 @@ def test_an_empty_graph_is_drawn() -> None:
     assert ElementTree.fromstring(hfg.Graph("empty").draw(format="svg")).get("aria-label") == "empty"
 
 
+@pytest.mark.slow
 def test_subgraphs_inside_each_other_are_drawn_however_deep() -> None:
     class Deeper(hfg.Subgraph):
         pass
@@ -418,6 +420,7 @@ def test_a_circle_goes_back_where_one_comes_round() -> None:
     assert card(drawn, "a").x < card(drawn, "b").x < card(drawn, "c").x
 
 
+@pytest.mark.slow
 def test_what_is_not_connected_is_put_side_by_side() -> None:
     graph = hfg.Graph()
     for _ in range(100):
@@ -456,6 +459,7 @@ def test_no_name_breaks_the_file(name: str) -> None:
     check_text(name)
 
 
+@pytest.mark.slow
 @given(st.text(min_size=1))
 def test_no_text_at_all_breaks_the_file(name: str) -> None:
     check_text(name)

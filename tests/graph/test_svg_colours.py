@@ -99,6 +99,7 @@ def texts() -> list[tuple[str, str]]:
     return [*found, ("mission", mission().draw(format="svg")), ("random", at_random(1).draw(format="svg"))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_no_label_has_an_outline_and_each_stands_out_from_what_it_lies_on(dark: bool) -> None:
     paper = "#14181d" if dark else "#ffffff"

@@ -14,6 +14,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from tests.links.world import Settings, World, join_or_leave, live, revive
 
+pytestmark = pytest.mark.slow
+
 WHICH = strategies.integers(0, 10_000)
 
 

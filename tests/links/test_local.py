@@ -94,6 +94,7 @@ def run(folder: Path, scenario: Callable[[Two], Coroutine[Any, Any, None]]) -> N
 # --- datagrams
 
 
+@pytest.mark.slow
 def test_datagrams_arrive_whole_and_in_order_whatever_their_size(tmp_path: Path) -> None:
     async def scenario(both: Two) -> None:
         source = random.Random(7)
@@ -424,12 +425,14 @@ def feed(inflow: Inflow, data: bytes, sizes: random.Random) -> list[Frame]:
     return found
 
 
+@pytest.mark.slow
 @given(st.lists(FRAMES, max_size=8), st.integers(0, 2**32))
 def test_frames_come_out_as_they_went_in_whatever_the_pieces(frames: list[Any], seed: int) -> None:
     found = feed(Inflow(Seals(SECRET), LARGEST), as_bytes(frames, Seals(SECRET)), random.Random(seed))
     assert [(kind, key, header, bytes(payload)) for kind, key, header, payload in found] == frames
 
 
+@pytest.mark.slow
 @given(st.lists(FRAMES, min_size=2, max_size=4, unique=True), st.sampled_from(["drop", "repeat", "swap", "other key"]))
 def test_frames_that_are_left_out_repeated_exchanged_or_of_another_connection_are_refused(
     frames: list[Any], how: str

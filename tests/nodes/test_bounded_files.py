@@ -229,6 +229,7 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024)
 """
 
 
+@pytest.mark.slow
 def test_files_of_some_kilobytes_cost_no_gigabytes(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(png(32000, 32000))
     (tmp_path / "a.npy").write_bytes(ARRAYS["says that a terabyte follows"])

@@ -104,6 +104,7 @@ def test_names_are_in_snake_case(theirs: str, ours: str) -> None:
     assert _recipes.names()[ours] == theirs
 
 
+@pytest.mark.slow
 def test_a_type_is_found_by_its_reference_in_another_process() -> None:
     program = (
         "from hfg import registry; kind = registry.find('hfg.nodes.cv:gaussian_blur'); "
@@ -401,6 +402,7 @@ def test_a_wrong_picture_in_a_graph_names_the_path() -> None:
     assert 'node "even" failed in firing 1: TypeError: input "src" of equalize_hist: expected Gray' in str(error.value)
 
 
+@pytest.mark.slow
 def test_a_picture_that_would_end_the_process_is_refused() -> None:
     """OpenCV writes beyond its memory when it takes the root of whole numbers; hfg never lets it."""
     program = (
@@ -543,6 +545,7 @@ def test_what_is_not_in_the_table_takes_pictures_of_8_bits(monkeypatch: pytest.M
         recipe.call(picture("float32", 1), ksize=(3, 3), anchor=(-1, -1), border_type="DEFAULT")
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_a_sample_of_the_measurement_gives_the_same_again() -> None:
     names = ["sqrt", "blur", "Canny", "equalizeHist"]
@@ -563,6 +566,7 @@ def test_documentation_is_read_without_markup() -> None:
     assert not any(mark in text for text in told.arguments.values() for mark in ("\\f$", "@ref", "#"))
 
 
+@pytest.mark.slow
 def test_importing_the_family_makes_no_type() -> None:
     program = "from hfg.nodes import cv; print(sum(type(one).__name__ == 'NodeFunction' for one in vars(cv).values()))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

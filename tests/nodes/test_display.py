@@ -225,6 +225,7 @@ def stamped(*samples: tuple[float, Any]) -> list[dict[str, Any]]:
     return [{"value": hfg.Token(value, 0, stamp)} for stamp, value in samples]
 
 
+@pytest.mark.slow
 def test_each_kind_of_plot_has_something_to_see() -> None:
     lines = last(display.TimePlot(), *stamped((0, 1.0), (1, 3.0), (2, 2.0)))
     assert lines.shape == (480, 640, 3)
@@ -239,6 +240,7 @@ def test_each_kind_of_plot_has_something_to_see() -> None:
     assert ink(last(display.HistogramPlot(), {"value": [1, 1, 2, 3]}, {"value": 2})) > 3000
 
 
+@pytest.mark.slow
 def test_a_plot_is_as_large_as_it_says_and_red_is_red() -> None:
     picture = last(display.ScatterPlot(width=200, height=100, point_size=80.0), {"x": 0.0, "y": 0.0})
     assert picture.shape == (100, 200, 3)
@@ -253,6 +255,7 @@ def test_nothing_is_drawn_of_nothing(node: Any) -> None:
     assert fire(node, hook="end").outputs == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -1e308, 1e308])
 def test_numbers_that_cannot_be_drawn_are_left_out(wrong: float) -> None:
     last(display.TimePlot(), *stamped((0, 1.0), (1, wrong), (2, 2.0)))
@@ -265,6 +268,7 @@ def test_a_title_is_taken_as_it_is() -> None:
     last(display.TimePlot(title="$\\frac{", label="$x$ %s"), *stamped((0, 1.0)))
 
 
+@pytest.mark.slow
 def test_a_plot_is_drawn_now_and_then_and_at_the_end() -> None:
     node = display.TimePlot(every=2, path="plot.png")
     assert [bool(fire(node, value=float(number)).outputs) for number in range(5)] == [False, True, False, True, False]
@@ -274,6 +278,7 @@ def test_a_plot_is_drawn_now_and_then_and_at_the_end() -> None:
     assert fire(node, hook="end").outputs == {}
 
 
+@pytest.mark.slow
 def test_a_plot_in_a_graph_is_written_when_the_stream_ends() -> None:
     report = run(display.TimePlot(path="plot.png", every=2), 1, 3, 2, rate_hz=1, output="plot")
     assert len(report.outputs["all"]) == 2

@@ -34,6 +34,7 @@ def test_every_module_of_the_library_can_be_imported(library: Catalogue) -> None
     assert library.problems == ()
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(900)  # by the clock, on a machine that has much else to do; each type is held to processor time
 def test_every_type_fires_with_what_it_declares(library: Catalogue) -> None:
     trials = try_all((one.reference for one in library.types), processes=2)

@@ -563,6 +563,7 @@ def test_a_file_that_is_missing_is_one_sentence(made: Any) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("made", SOURCES)
 def test_a_source_names_its_path_in_the_graph_and_the_file_that_is_missing(made: Any) -> None:
     missing = Path("such.file").absolute()
@@ -661,6 +662,7 @@ def program(text: str, **how: Any) -> subprocess.Popen[str]:
     )
 
 
+@pytest.mark.slow
 def test_a_program_answers_each_line_of_a_pipe_as_it_comes() -> None:
     with program(ECHO) as running:
         assert running.stdin is not None
@@ -673,6 +675,7 @@ def test_a_program_answers_each_line_of_a_pipe_as_it_comes() -> None:
     assert (rest, errors, running.returncode) == ("DREI\nVIER\ndone\n", "", 0)
 
 
+@pytest.mark.slow
 def test_a_program_that_is_stopped_does_not_wait_for_the_keyboard() -> None:
     with program(ECHO.replace("hfg.run(graph)", "hfg.run(graph, until_s=0.2)")) as running:
         try:

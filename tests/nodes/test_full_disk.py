@@ -39,6 +39,7 @@ def writers() -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_each_writing_node_of_the_library_is_fed_here() -> None:
     assert len(writers()) >= 19
     assert [reference for reference in writers() if not ways(reference)] == []
@@ -62,6 +63,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files")
 def test_a_node_that_writes_leaves_a_complete_file_or_none(outcomes: list[dict[str, Any]]) -> None:
     whole = [one for one in outcomes if one["limit"] is None]

@@ -74,6 +74,7 @@ def test_samples_are_made_and_labelled() -> None:
         fire(learning.label_samples(), samples=samples, labels=[5])
 
 
+@pytest.mark.slow
 def test_the_function_gives_the_same_samples_for_a_seed_and_outliers_as_often_as_said() -> None:
     samples = drawn(count=2000, seed=3, outliers=0.3)
     assert samples == drawn(count=2000, seed=3, outliers=0.3) != drawn(count=2000, seed=4, outliers=0.3)
@@ -184,6 +185,7 @@ def test_a_sample_of_another_kind_than_learned_from_is_refused() -> None:
         fire(learning.Classifier(path=path), samples=[Sample((1.0, 2.0, 3.0))])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "content", [b"", b"\xff\xfe\x00", b"%YAML:1.0\n---\na: 1\n", b"hello", b"%YAML:1.0\n---\nopencv_ml_svm:\n"]
 )
@@ -193,6 +195,7 @@ def test_a_file_that_holds_no_model_is_one_sentence(content: bytes) -> None:
         fire(learning.Classifier(path="model.yaml"), samples=[BLUE[0]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trainer", TRAINERS, ids=lambda one: one.__name__)
 @pytest.mark.parametrize("part", [0.2, 0.5, 0.8])
 def test_a_file_that_was_cut_off_is_refused(trainer: Any, part: float) -> None:

@@ -16,6 +16,8 @@ import pytest
 
 from tests.limits import patience
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("zenoh", reason="needs pip install 'hfg[zenoh]'")
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -123,6 +123,7 @@ def test_an_end_that_nobody_had_heard_is_not_the_end_of_the_next_life(world: Wor
     play(scene)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L1", "L2", "L3")
 @pytest.mark.parametrize("seed", range(12))
 def test_whatever_dies_when_on_a_bad_network_who_lives_on_gets_each_value_once_and_in_order(

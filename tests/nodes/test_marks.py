@@ -61,6 +61,7 @@ def trouble(rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
+@pytest.mark.slow
 def test_bullseyes_are_found_where_they_are_and_nowhere_else() -> None:
     """100 views, 0.6 to 4.5 m: 98 % are found, within 1 pixel, their height within 2 %, and nothing else."""
     find = vision.find_bullseyes.function
@@ -104,6 +105,7 @@ def test_squares_stars_and_texts_are_no_bullseyes() -> None:
     assert fire(vision.find_bullseyes(), image=image).outputs["out"] == []
 
 
+@pytest.mark.slow
 def test_quadrilaterals_are_found_to_a_fraction_of_a_pixel() -> None:
     """Views of a frame of 0.4 m, 1 to 6 m: 98 % found, the worst corner off by 0.6 pixel on average, 2.5 at most."""
     find = vision.find_quadrilaterals.function

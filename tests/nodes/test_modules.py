@@ -58,6 +58,7 @@ def test_what_cannot_be_a_node_says_why() -> None:
         _ = filters.gausian
 
 
+@pytest.mark.slow
 def test_every_function_of_a_module_becomes_a_type_that_is_described() -> None:
     assert len(filters) > 60
     for kind in filters:
@@ -91,6 +92,7 @@ def test_annotations_are_types() -> None:
     assert fire(shapes.area(scale=3.0), width=1.0, height=2.0).outputs["out"] == 6.0
 
 
+@pytest.mark.slow
 def test_a_type_is_found_by_the_name_that_its_module_gave(tmp_path: Path) -> None:
     (tmp_path / "my_filters.py").write_text(
         "import scipy.ndimage\nfrom hfg.nodes import from_module\nfilters = from_module(scipy.ndimage)\n"

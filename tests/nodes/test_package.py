@@ -14,6 +14,7 @@ import hfg.nodes
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "library.md"
 
 
+@pytest.mark.slow
 def test_no_family_is_imported_before_it_is_asked_for() -> None:
     told = "import sys, hfg.nodes; print([name for name in sys.modules if name.startswith('hfg.nodes.')])"
     done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)

@@ -103,6 +103,7 @@ def test_a_wall_is_no_disk_and_no_points_are_none() -> None:
         robotics.find_disks.function(wall, wall[:3])
 
 
+@pytest.mark.slow
 def test_a_scan_is_laid_onto_the_map_though_much_of_it_is_hidden() -> None:
     """200 poses, guesses off by up to 0.2 m and 6 degrees, three disks in the way: all within 2 cm and 0.6 degrees."""
     rng = np.random.default_rng(2)

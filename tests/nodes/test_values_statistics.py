@@ -69,6 +69,7 @@ def test_a_sum_goes_on_and_begins_anew() -> None:
     check(values.CumulativeSum(), value="12-3|", clear="--!", expected={"total": "13-3|"})
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(NUMBERS, st.integers(1, 8))
 def test_the_window_holds_the_last_numbers(numbers: list[float], size: int) -> None:

@@ -292,6 +292,7 @@ def test_points_are_followed() -> None:
     assert np.median(second["points"] - second["before"], axis=0)[0] == pytest.approx([2, 0], abs=0.2)
 
 
+@pytest.mark.slow
 def test_an_object_is_followed_from_where_it_was_said_to_be() -> None:
     rng = np.random.default_rng(1)
     wall = np.repeat(rng.integers(0, 80, (120, 160, 1), np.uint8), 3, axis=2)

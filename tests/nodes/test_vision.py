@@ -103,6 +103,7 @@ def test_a_camera_is_calibrated_by_pictures_of_a_board() -> None:
     assert fire(node, image=flat).outputs["accepted"] == 1
 
 
+@pytest.mark.slow
 def test_a_face_is_found_in_a_photograph() -> None:
     photograph = np.ascontiguousarray(skimage.data.astronaut()[:, :, ::-1])  # type: ignore[no-untyped-call]
     boxes = fire(vision.CascadeDetector(neighbors=6), image=photograph).outputs["boxes"]
@@ -111,6 +112,7 @@ def test_a_face_is_found_in_a_photograph() -> None:
     assert y < 110 < y + height
 
 
+@pytest.mark.slow
 def test_a_cascade_that_is_not_there_names_those_that_are(tmp_path: Any) -> None:
     with pytest.raises(FileNotFoundError, match='no cascade "nose": name a file, or one of eye, .*frontalface_default'):
         fire(vision.CascadeDetector(cascade="nose"), image=np.zeros((9, 9), np.uint8))

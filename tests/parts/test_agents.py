@@ -339,6 +339,7 @@ def test_an_agent_that_is_ended_ends_its_parts_and_the_run_waits_for_the_next(wo
     assert play(world, scene) == list(range(20))
 
 
+@pytest.mark.slow
 def test_a_part_is_restarted_when_somebody_asks_for_it_and_that_is_no_death(world: World) -> None:
     async def scene() -> tuple[list[Any], list[tuple[str, str, int]]]:
         await world.agent("arm")

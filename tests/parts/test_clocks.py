@@ -14,6 +14,7 @@ from hfg.parts.model.clocks import DRIFT, Offset
 from hfg.parts.processes import worker
 
 
+@pytest.mark.slow
 @pytest.mark.rule("T5")
 @given(
     offset_s=st.floats(-1e6, 1e6),

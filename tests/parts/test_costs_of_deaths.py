@@ -167,6 +167,7 @@ def test_what_is_lost_before_a_ledger_is_counted_and_the_run_ends(
     assert report.edges["telling.out -> last.value"].lost == 40 - len(report.outputs["out"]) == lost
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L2")
 def test_check_says_what_a_death_costs(tmp_path: Path) -> None:
     (tmp_path / "two.py").write_text(TWO_CHAINS)

@@ -20,6 +20,8 @@ from hfg_transports.memory import Faults, Network
 from tests.parts.lit import lit
 from tests.semantics.test_random_graphs import reference
 
+pytestmark = pytest.mark.slow
+
 Sequences = dict[str, list[tuple[Any, int]]]
 
 

@@ -18,6 +18,8 @@ from hfg.trace import NodeEnded, TokenSent, TokenTaken, TraceEvent
 from tests.parts.lit import lit, side_by_side
 from tests.parts.test_cut_graphs import run, sequences
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("zenoh", reason="processes speak over Zenoh")
 
 ALLOWED = replace(SYNCHRONOUS, boxes=False)  # types that are made on the spot cannot be found by name elsewhere

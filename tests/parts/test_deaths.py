@@ -161,6 +161,7 @@ def test_a_relay_that_dies_at_any_moment_loses_and_doubles_nothing(killed: Any, 
     assert any('the process of group "relay0" was begun again 1 times' in error for error in report.errors)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L2", "L3")
 @pytest.mark.parametrize("seed", range(12))
 def test_relays_in_a_row_that_die_at_random_lose_and_double_nothing(killed: Any, seed: int) -> None:
@@ -218,6 +219,7 @@ def joined(count: int) -> hfg.Graph:
     return graph
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L2")
 @pytest.mark.parametrize("seed", range(10))
 def test_what_a_join_puts_together_belongs_together_whoever_dies(killed: Any, seed: int) -> None:

@@ -23,6 +23,8 @@ from hfg.parts.processes import launching
 from hfg.parts.running.channels import Channel
 from hfg_transports.memory import Faults, Network
 
+pytestmark = pytest.mark.slow
+
 SEEDS = int(os.environ.get("HFG_SOAK_DEATHS", "5000"))
 BAD = Faults(loss=0.2, repetition=0.1, delay_s=(0.0, 0.004))
 CYCLIC = 0.15  # of so many of the graphs two processes feed each other

@@ -11,6 +11,8 @@ import pytest
 
 import hfg
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("zenoh", reason="processes speak over Zenoh")
 
 COUNT = 300

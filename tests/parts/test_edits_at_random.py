@@ -18,6 +18,8 @@ from tests.parts.mortal import mortal_parts
 from tests.parts.test_edits import HERE, more
 from tests.parts.test_from_outside import through, with_run
 
+pytestmark = pytest.mark.slow
+
 SEEDS = int(os.environ.get("HFG_SOAK_EDITS", "2000"))
 VALUES = 80
 SOON_S = 60.0  # of virtual time

@@ -171,6 +171,7 @@ def shared_memory() -> set[str]:
     return {file.name for file in Path("/dev/shm").glob("hfg-*")} if Path("/dev/shm").exists() else set()
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L1", "L2", "L3")
 def test_a_run_is_deployed_looked_at_restarted_and_stopped_from_another_host(
     cell: Cell, capsys: pytest.CaptureFixture[str]

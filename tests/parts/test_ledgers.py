@@ -109,6 +109,7 @@ def test_state_and_edges_agree_at_whatever_moment_a_process_dies(killed: Any, mo
     assert found == {"out": sums, "all": [sums], "often": [[3, 6, 9, 12, 15, 18]]}
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L2", "L3")
 @pytest.mark.parametrize("seed", range(8))
 def test_processes_with_ledgers_that_die_at_random_lose_and_double_nothing(killed: Any, seed: int) -> None:
@@ -152,6 +153,7 @@ def mixed(choose: random.Random) -> hfg.Graph:
     return graph
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L2", "L3", "F7")
 @pytest.mark.parametrize("seed", range(15))
 def test_random_graphs_whose_processes_die_at_random_give_what_they_give_undisturbed(killed: Any, seed: int) -> None:
@@ -177,6 +179,7 @@ def in_file(path: str, **options: Any) -> hfg.Graph:
     return graph
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L2")
 @pytest.mark.parametrize("until_s", [0.0205, 0.031, 0.0505, 0.09])
 def test_the_next_run_goes_on_from_what_a_file_has_kept(tmp_path: Path, until_s: float) -> None:

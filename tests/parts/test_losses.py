@@ -132,6 +132,7 @@ def test_more_signals_at_once_than_a_queue_holds_are_dropped_by_its_own_policy(o
     assert report.outputs["out"][:20] == list(range(20))
 
 
+@pytest.mark.slow
 @pytest.mark.rule("P5")
 def test_a_flood_of_signals_does_not_wait_until_the_loop_has_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engine, "_SHORT_SLICE_S", 0.0)  # else it were for the machine to say how many leave

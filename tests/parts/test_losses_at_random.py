@@ -24,6 +24,8 @@ from hfg.trace import TokenTaken, TraceEvent
 from hfg_transports.memory import Network
 from tests.parts.test_deaths_at_random import BAD, BETWEEN_DEATHS_S
 
+pytestmark = pytest.mark.slow
+
 SOAK = int(os.environ.get("HFG_SOAK_LOSSES", "200"))
 SOON_S = 120.0
 COUNT = 40

@@ -19,6 +19,8 @@ from hfg.parts.processes import launching
 from hfg.parts.processes.meeting import MeetingPlace
 from tests.limits import patience
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("zenoh", reason="processes speak over Zenoh")
 
 NODES = """

@@ -295,6 +295,7 @@ def left_behind(run: str) -> list[str]:
     return [one.name for one in Path("/dev/shm").iterdir() if one.name.startswith(run)]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L1", "L4")
 def test_pictures_go_through_shared_memory_both_ways_and_arrive_to_the_bit() -> None:
     done, said = run_program()
@@ -307,6 +308,7 @@ def test_pictures_go_through_shared_memory_both_ways_and_arrive_to_the_bit() -> 
     assert left_behind(run) == []
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L1")
 def test_a_consumer_that_keeps_all_it_sees_gets_the_rest_the_ordinary_way_and_that_is_counted() -> None:
     done, said = run_program(keeps=True, count=24)
@@ -320,6 +322,7 @@ def test_a_consumer_that_keeps_all_it_sees_gets_the_rest_the_ordinary_way_and_th
     assert left_behind(run_of(said)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L1", "L2")
 def test_a_process_that_is_killed_begins_anew_with_a_ring_of_its_own_and_nothing_is_left_behind(tmp_path: Path) -> None:
     done, said = run_program(count=40, flip_dies_at=15, mark=tmp_path / "dead")
@@ -335,6 +338,7 @@ def test_a_process_that_is_killed_begins_anew_with_a_ring_of_its_own_and_nothing
     assert left_behind(run) == []
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L1")
 def test_a_main_part_that_is_killed_leaves_no_shared_memory_behind_for_the_others_see_to_it() -> None:
     done, said = run_program(judge_dies_at=12)

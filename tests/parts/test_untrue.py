@@ -321,6 +321,7 @@ def test_counts_that_are_none_are_refused_and_those_of_others_are_left_out(
     assert len(world.refused) == 2  # the answer of another, and its own that is none
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L4")
 def test_records_with_ever_new_loggers_hold_no_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     world = World(monkeypatch)
@@ -334,6 +335,7 @@ def test_records_with_ever_new_loggers_hold_no_memory(monkeypatch: pytest.Monkey
     assert len(logging.root.manager.loggerDict) - before <= 1002
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L4", "L1")
 def test_words_behind_tokens_that_never_come_hold_no_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     world = World(monkeypatch)
@@ -383,6 +385,7 @@ def a_lie(choose: random.Random) -> Message:
     return choose.choice(lies)()
 
 
+@pytest.mark.slow
 @pytest.mark.rule("L4", "L1")
 @pytest.mark.parametrize("block", range(4))
 def test_whatever_a_part_says_at_random_the_others_compute_what_they_do(

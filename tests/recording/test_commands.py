@@ -15,6 +15,8 @@ import pytest
 from hfg.recording import File
 from tests.limits import patience
 
+pytestmark = pytest.mark.slow
+
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
 

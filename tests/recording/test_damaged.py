@@ -85,6 +85,7 @@ def _changed_in_silence(written: Written, whole: bytes, places: Iterator[int], r
     return found
 
 
+@pytest.mark.slow
 def test_no_byte_can_be_another_in_silence(whole: bytes, written: Written) -> None:
     """Each is tried in the soak; here those of the ends, and some between."""
     seed = random.Random(5)
@@ -276,6 +277,7 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024)
 """
 
 
+@pytest.mark.slow
 def test_a_few_kilobytes_cost_no_gigabytes(tmp_path: Path) -> None:
     files = []
     for number, name in enumerate(name for name in damage.HOSTILE if "unpacks" in name or "huge" in name):

@@ -14,6 +14,8 @@ import hfg
 from hfg.cli.target import load_graph
 from hfg.recording import File, Playing, play_into
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 OF_TIME = {"began", "call", "last", "sequence", "silent", "stamp", "time", "timestamp", "waited"}
 DETERMINISTIC = ("hello", "word_count", "many_requests")

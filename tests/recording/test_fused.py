@@ -83,6 +83,7 @@ def differs(seed: int, allowed: Allowed, file: Path) -> str:
     return f"{plan}\n{one[0]}, {other[0]}; at message {at}:\n  {one[1][at:][:3]}\n  {other[1][at:][:3]}"
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R7", "F7", "R2")
 @pytest.mark.parametrize("block", range(6))
 def test_random_graphs_are_recorded_alike_fused_and_interpreted(

@@ -86,6 +86,7 @@ def _is_of(edge: str, nodes: tuple[str, ...]) -> bool:
     return bool(nodes) and any(part.startswith(nodes) for part in edge.split(" -> "))
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F7", "R6", "A3", "A5", "F9", "F13")
 @pytest.mark.parametrize("allowed", [SYNCHRONOUS, Allowed()], ids=["synchronous", "with all that there is"])
 def test_a_hundred_random_graphs_are_the_same_on_every_edge_when_they_are_played_back(
@@ -99,6 +100,7 @@ def test_a_hundred_random_graphs_are_the_same_on_every_edge_when_they_are_played
     assert {seed: differs for seed, differs in found.items() if differs} == {}
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F3", "F7")
 @pytest.mark.parametrize("speed", [None, 1.0], ids=["as fast as can be", "in its time"])
 def test_random_graphs_recorded_on_the_real_clock_send_the_same_when_they_are_played_back(

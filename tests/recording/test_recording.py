@@ -280,6 +280,7 @@ class SlowDisk:
         return getattr(self._file, name)
 
 
+@pytest.mark.slow
 def test_without_loss_nothing_is_missing_however_far_the_disk_is_behind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

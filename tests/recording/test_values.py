@@ -113,6 +113,7 @@ plain = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(plain)
 def test_whatever_is_nested_comes_back(value: Any) -> None:
     found = there_and_back(object, value)

@@ -196,6 +196,7 @@ def test_a_page_loads_nothing_and_says_so(tmp_path: Path) -> None:
 HOSTILE = ["<script>alert(1)<!--", '" onload="alert(1)', "]]>", "&amp;", "中文", "-->"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HOSTILE, ids=range(len(HOSTILE)))
 def test_no_name_breaks_the_page(tmp_path: Path, name: str) -> None:
     def build(name: str) -> hfg.Graph:

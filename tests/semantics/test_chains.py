@@ -18,6 +18,7 @@ LENGTH = 5_000
 variable: contextvars.ContextVar[str] = contextvars.ContextVar("variable", default="unset")
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F5")
 @pytest.mark.parametrize("release", ["sequential", "pipelined"])
 def test_a_chain_of_5000_nodes_needs_no_deep_stack(release: Any, fast: bool) -> None:
@@ -33,6 +34,7 @@ def test_a_chain_of_5000_nodes_needs_no_deep_stack(release: Any, fast: bool) -> 
     assert sink.values == [1, 2]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F8")
 def test_a_chain_of_5000_events_into_slots_needs_no_deep_stack(fast: bool) -> None:
     graph = hfg.Graph()
@@ -65,6 +67,7 @@ def test_a_long_chain_ends_is_disabled_and_silent_without_a_deep_stack(fast: boo
     assert report.nodes["keep"].ended
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F5", "R1")
 def test_a_chain_of_async_nodes_that_do_not_wait_needs_no_deep_stack(fast: bool) -> None:
     graph = hfg.Graph()

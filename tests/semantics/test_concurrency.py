@@ -127,6 +127,7 @@ def test_code_that_never_waits_is_over_before_the_next_begins(ordered: bool, fas
     assert most_at_once(trace) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F14", "F7")
 @pytest.mark.parametrize("ordered", [True, False])
 def test_ten_thousand_firings_in_virtual_time(ordered: bool, fast: bool, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -132,6 +132,7 @@ class Shares(hfg.Node):
         return value
 
 
+@pytest.mark.slow
 @pytest.mark.rule("P8", "X1", "F14")
 @pytest.mark.parametrize(
     ("options", "given"),
@@ -176,6 +177,7 @@ def test_outputs_still_wait_until_those_before_them_have_been_processed(perform:
     assert found == [1, 3, 5, 7]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F14", "F1")
 def test_no_firing_begins_while_the_outputs_hold_an_unprocessed_token(perform: Any) -> None:
     """All of F1 still holds, but for "not busy": what is over leaves before the next begins."""
@@ -217,6 +219,7 @@ def telling(pauses: Pauses, **options: Any) -> hfg.Graph:
     return graph
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F14", "F3")
 def test_signals_leave_when_they_are_triggered_though_the_outputs_wait(perform: Any) -> None:
     def build() -> hfg.Graph:
@@ -228,6 +231,7 @@ def test_signals_leave_when_they_are_triggered_though_the_outputs_wait(perform: 
     assert perform(build, read) == ([(0, 1), (0, 2), (0, 3)], [(1, 2), (2, 3), (3, 1)])
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F14", "F4")
 @pytest.mark.parametrize("ordered", [True, False])
 def test_the_last_word_is_said_when_all_firings_are_over_and_leaves_behind_them(perform: Any, ordered: bool) -> None:
@@ -253,6 +257,7 @@ def test_processed_follows_the_outputs_of_each_firing(perform: Any) -> None:
 # --- F7
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F7", "F14")
 @pytest.mark.parametrize("concurrency", [1, 2, 3, 8])
 @pytest.mark.parametrize("release", ["sequential", "pipelined"])
@@ -493,6 +498,7 @@ def test_disabling_applies_to_every_firing_under_way(
     assert perform(build, read) == ([disabled], given)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F14", "A11")
 def test_behind_a_closed_gate_each_firing_is_silent_in_its_turn(perform: Any) -> None:
     """The gate closes behind the second: what has begun goes on, what begins then is silent and leaves behind it."""
@@ -705,6 +711,7 @@ def calls_of(seen: Recorder, node: str) -> list[tuple[float, float]]:
 ANSWERS = "node.out -> behind.value"
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F14", "A9", "F9")
 def test_a_reset_begins_at_once_and_is_over_behind_the_code_of_all_firings(perform: Any) -> None:
     """No firing and no other call begins meanwhile, and nobody works on what was torn down under its hands."""
@@ -718,6 +725,7 @@ def test_a_reset_begins_at_once_and_is_over_behind_the_code_of_all_firings(perfo
     assert perform(build, lambda seen: starts(seen, "node", kind="process")) == [0, 0, 3]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F14", "A9")
 def test_a_reset_does_not_wait_for_what_is_over_and_has_not_left(perform: Any) -> None:
     """The second is over at 0.25 and waits behind the first, which the consumer keeps for five seconds."""
@@ -743,6 +751,7 @@ def test_a_reset_before_the_turn_of_its_end_has_come_ends_that() -> None:
     replay(lambda: called_amid((0.25, 0.25, 0.25), "reset", concurrency=4, for_s=5.0), seen)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F14", "F10")
 def test_who_is_enabled_again_amid_its_firings_comes_back_behind_them(perform: Any) -> None:
     def build() -> hfg.Graph:
@@ -755,6 +764,7 @@ def test_who_is_enabled_again_amid_its_firings_comes_back_behind_them(perform: A
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F14", "G2")
 def test_a_reset_of_a_subgraph_waits_for_none_of_its_firings(perform: Any) -> None:
     """Each node inside is reset as soon as none of its firings is under way; the call is over at once."""

@@ -95,7 +95,7 @@ class Lives(hfg.Node):
 def beside(graph: hfg.Graph, what: str) -> None:
     """Something that lives on and has nothing to do with the ring."""
     if what == "a source with a rate":
-        graph.add(ticker(every_s=0.25)) >> graph.add(plain(), name="other")
+        graph.add(ticker(every_s=2.0)) >> graph.add(plain(), name="other")  # slow: the oracle pays for each number
     elif what == "a source that waits":
         graph.add(forever()) >> graph.add(plain(), name="other")
     elif what == "a task":

@@ -309,6 +309,7 @@ class WritesWithInput(hfg.Node):
         return 1
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A15", "F3")
 def test_outputs_belong_to_firings(perform: Any) -> None:
     def build() -> hfg.Graph:

@@ -7,6 +7,8 @@ import pytest
 from hfg.testing.making import Allowed
 from tests.support.edited import EditedRun
 
+pytestmark = pytest.mark.slow
+
 SEQUENCES = 300
 
 

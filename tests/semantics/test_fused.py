@@ -135,6 +135,7 @@ def check(calls: Calls, seed: int, allowed: Allowed) -> None:
     pytest.fail(f"seed {seed}\n{small}\n\n{fusing_differs(calls, small, seed)}", pytrace=False)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R2", "R7", "F3", "F4", "F5", "T5", "X1")
 @pytest.mark.parametrize("block", range(8))
 def test_fused_interpreted_and_watched_runs_are_one(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,6 +145,7 @@ def test_fused_interpreted_and_watched_runs_are_one(block: int, monkeypatch: pyt
     assert calls.share > LEAST_SHARE
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R1", "F7")
 @pytest.mark.parametrize("seed", range(30))
 def test_threads_beside_a_region_change_nothing_of_it(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:

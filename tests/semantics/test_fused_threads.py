@@ -402,6 +402,7 @@ class Recorder(hfg.Node):
         self.kept.append(value)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F7", "R2")
 @pytest.mark.parametrize("clock", ["virtual", "real"])
 @pytest.mark.parametrize("block", range(6))
@@ -430,6 +431,7 @@ def test_random_graphs_in_threads_send_what_the_oracle_sends(clock: Any, block: 
             assert wanted.outcome != "done" or len(kept) == len(sequence), f"{label}, schedule {seed} of\n{plan}"
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R6", "F7")
 @pytest.mark.parametrize("block", range(6))
 def test_random_graphs_in_threads_do_the_same_each_time_in_virtual_time(block: int) -> None:

@@ -343,6 +343,7 @@ class Many(hfg.Subgraph):
             graph.add(Ear())
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F10")
 def test_a_box_of_thousands_is_disabled_enabled_and_reset_without_a_deep_stack(fast: bool) -> None:
     async def main() -> None:

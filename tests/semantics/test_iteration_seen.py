@@ -90,6 +90,7 @@ def run_at_random(plan: Any, seed: int) -> list[TraceEvent]:
     return trace
 
 
+@pytest.mark.slow
 @pytest.mark.rule("G3", "G4", "R7", "F8", "P9")
 @pytest.mark.parametrize("decade", range(3))
 def test_random_graphs_inside_of_what_iterates_do_what_the_rules_say(decade: int) -> None:
@@ -108,6 +109,7 @@ def test_random_graphs_inside_of_what_iterates_do_what_the_rules_say(decade: int
             replaying.machine.close()
 
 
+@pytest.mark.slow
 @pytest.mark.rule("G4", "R4")
 @pytest.mark.parametrize("quiet", [False, True])
 def test_random_edits_inside_of_what_iterates_do_what_the_rules_say(quiet: bool) -> None:

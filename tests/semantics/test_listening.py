@@ -120,6 +120,7 @@ def test_a_modifier_that_came_to_deaf_ears_acts_and_activity_is_heard() -> None:
     assert changes == [True, False]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("T4", "F6")
 @pytest.mark.parametrize("watched", [False, True])
 def test_of_many_nodes_behind_an_output_only_the_active_one_is_called(watched: bool) -> None:
@@ -193,6 +194,7 @@ def test_a_machine_does_the_same_whether_somebody_looks_or_not(states: int) -> N
     assert asyncio.run(go(trace=lambda _: None)) == plain
 
 
+@pytest.mark.slow
 @pytest.mark.rule("T4", "A3", "A6", "P5", "F6")
 @pytest.mark.parametrize("block", range(10))
 def test_random_graphs_of_listening_nodes_do_what_the_oracle_permits(block: int) -> None:

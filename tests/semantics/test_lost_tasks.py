@@ -102,6 +102,7 @@ def test_one_that_still_runs_at_the_end_is_told_of_with_node_and_remedy(
     assert caplog.records[0].name == "hfg.node.node"
 
 
+@pytest.mark.slow
 @pytest.mark.rule("X1")
 @pytest.mark.parametrize("kept", [True, False])
 def test_one_that_has_failed_with_nobody_there_is_told_of_once_with_the_users_frames(

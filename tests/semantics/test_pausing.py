@@ -445,6 +445,7 @@ async def _handle(run: Any, graph: hfg.Graph, rng: random.Random) -> None:
             run.pause()
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R3", "F7")
 @pytest.mark.parametrize("seed", range(40))
 def test_steps_and_pauses_are_one_more_schedule_that_the_rules_permit(seed: int) -> None:

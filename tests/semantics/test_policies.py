@@ -61,6 +61,7 @@ def loaded(policy: str, group: str = "loop", **options: Any) -> dict[str, float]
 # --- fair share ---
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R2")
 @pytest.mark.parametrize("group", ["loop", "side"])
 def test_a_fair_share_is_the_same_time_for_each_however_long_a_firing_takes(group: str, fast: bool) -> None:
@@ -313,6 +314,7 @@ def test_no_policy_shows_in_what_runs_over_synchronous_edges(seed: int) -> None:
             assert wanted.outcome != "done" or len(found) == len(sequence)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R2")
 @pytest.mark.parametrize("policy", POLICIES)
 def test_the_oracle_permits_every_policy(policy: str) -> None:

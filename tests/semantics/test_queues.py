@@ -73,6 +73,7 @@ def mixed(policy: str, seed: int, place: int, release: str) -> dict[str, list[An
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F7")
 def test_what_runs_over_every_edge_depends_on_no_policy_group_or_mode() -> None:
     expected = mixed("fifo", 0, 0, "auto")

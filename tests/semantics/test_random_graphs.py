@@ -22,6 +22,8 @@ from hfg.testing.plans import GraphPlan
 from hfg.trace import TraceEvent
 from tests.support.shrinking import shrink
 
+pytestmark = pytest.mark.slow
+
 MOST_MOVES = 1500
 MOST_EVENTS = 5_000  # what ends under one schedule may go round for ever under another: then a run is stopped
 EVERYTHING = Allowed()

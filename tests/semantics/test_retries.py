@@ -233,6 +233,7 @@ def tried(seen: Recorder) -> list[tuple[float, int, int, float]]:
 GIVEN = "node.out -> keep.value"
 
 
+@pytest.mark.slow
 @pytest.mark.rule("X1")
 @pytest.mark.parametrize(
     ("concurrency", "again", "given"),
@@ -263,6 +264,7 @@ def test_a_firing_is_over_behind_its_last_attempt(
     assert perform(build, lambda seen: sent(seen, GIVEN)) == given
 
 
+@pytest.mark.slow
 @pytest.mark.rule("X1", "F3")
 @pytest.mark.parametrize("concurrency", [1, 2])
 def test_nobody_tries_again_behind_a_signal_or_behind_the_last_retry(perform: Any, concurrency: int) -> None:
@@ -277,6 +279,7 @@ def test_nobody_tries_again_behind_a_signal_or_behind_the_last_retry(perform: An
         assert [one for one in told if one[1] is not END] == heard
 
 
+@pytest.mark.slow
 @pytest.mark.rule("X1", "X2")
 def test_the_limit_of_time_is_for_each_attempt_and_the_pause_not_part_of_it(perform: Any) -> None:
     def build() -> hfg.Graph:

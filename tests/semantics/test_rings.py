@@ -475,6 +475,7 @@ def test_a_ring_grows_whose_nodes_an_edit_waits_for() -> None:
 RINGS = Allowed(rings=True, max_nodes=4)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F8", "F6", "F9")
 @pytest.mark.parametrize("block", range(4))
 def test_random_rings_beside_what_lives_on_grow_when_the_oracle_says_so(block: int) -> None:
@@ -501,6 +502,7 @@ def lives(plan: GraphPlan) -> GraphPlan:
     return GraphPlan((*plan.nodes, *beside), plan.edges, plan.boxes, plan.gates, plan.groups, plan.feeds)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F8")
 @pytest.mark.parametrize("block", range(3))
 def test_no_ring_stands_still_because_something_lives_beside_it(block: int) -> None:

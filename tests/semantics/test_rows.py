@@ -156,6 +156,7 @@ def rows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R2", "F8", "F9")
 @pytest.mark.parametrize("block", range(8))
 def test_rows_of_calls_do_what_single_turns_do_in_the_same_order(

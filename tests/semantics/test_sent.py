@@ -367,6 +367,7 @@ def test_it_is_drawn_as_an_event_and_checked_as_one() -> None:
     assert [problem for problem in graph.check() if problem.severity != "hint"] == []
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A9")
 def test_the_oracle_says_the_same_under_every_schedule() -> None:
     def build() -> hfg.Graph:

@@ -68,6 +68,7 @@ def accept_the_same(machine: StateMachine, word: Sequence[str], schedule: tuple[
         assert in_haste[-1] == seen[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A13")
 @settings(max_examples=200, deadline=None)
 @given(machines(), words, schedules)
@@ -77,6 +78,7 @@ def test_a_machine_and_its_graph_accept_the_same_words_with_one_active_state_und
     accept_the_same(machine, word, schedule)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A13")
 @settings(max_examples=100, deadline=None)
 @given(machines())
@@ -120,6 +122,7 @@ def test_states_of_ones_own_do_their_work_and_move_on_by_their_own_events() -> N
     assert told == ["closed at 0 s", "open at 3 s", "closed at 5 s", "open at 6 s", "closed at 8 s"]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("A13")
 def test_signals_in_one_burst_are_read_one_after_the_other() -> None:
     class Keyboard(hfg.Node):

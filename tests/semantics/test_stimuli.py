@@ -13,6 +13,7 @@ from tests.semantics.nodes import Keep, drive
 from tests.support.machines import EngineAgainstOracle
 
 
+@pytest.mark.slow
 @pytest.mark.rule("P10", "F10", "A4", "A7", "A9", "A14", "P8")
 def test_what_comes_from_outside_has_the_same_effect() -> None:
     run_state_machine_as_test(

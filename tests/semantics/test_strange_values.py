@@ -185,6 +185,7 @@ def run_strange(graph: hfg.Graph, mode: str, folder: Path) -> hfg.Report:
     return report
 
 
+@pytest.mark.slow
 @pytest.mark.rule("X1", "F3", "P8")
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("what", STRANGE)

@@ -669,6 +669,7 @@ POLICIES: list[Policy] = ["skip", "skip", "disable"]
 TIMES = st.integers(0, 8).map(lambda quarters: quarters / 4)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R5", "R6")
 @settings(deadline=None)
 @given(

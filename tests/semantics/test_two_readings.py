@@ -98,6 +98,7 @@ def test_a_pipelined_slot_frees_the_output_when_the_call_takes_the_token(perform
 # --- P4: a buffer is a row of relays
 
 
+@pytest.mark.slow
 @pytest.mark.rule("P4")
 @pytest.mark.parametrize(
     ("release", "buffer", "expected"),
@@ -736,6 +737,7 @@ def test_what_lies_before_a_source_that_is_given_up_is_drained(perform: Any, cou
     assert perform(build, lambda seen: seen.outcome) == "done"
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R5", "F12", "F7")
 def test_who_feeds_a_source_that_is_given_up_and_others_goes_on_for_those(perform: Any) -> None:
     def build() -> hfg.Graph:
@@ -781,6 +783,7 @@ def test_a_blocked_source_has_stalled_also_beside_one_without_end_that_works_for
     assert found == ("stalled", [1])
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R5", "F12")
 def test_what_works_for_nobody_goes_on_for_whoever_is_set_up_afresh(perform: Any) -> None:
     def build() -> hfg.Graph:

@@ -39,6 +39,7 @@ steps = st.lists(
 )
 
 
+@pytest.mark.slow
 @given(steps)
 def test_what_is_drawn_reads_the_same(drawn: list[tuple[object, int, int]]) -> None:
     tick, line = 0, []

@@ -20,6 +20,8 @@ from hfg.testing.enduring import Endured, endure
 from hfg.testing.hostile import Hostile
 from hfg.types import accepts
 
+pytestmark = pytest.mark.slow
+
 HERE = "tests.testing.test_enduring"
 NATIVE = ("cv", "vision", "video", "learning", "csapex")
 """Families whose nodes call native code of others."""

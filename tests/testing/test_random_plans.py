@@ -184,6 +184,7 @@ def runs(plans: Iterable[tuple[int, GraphPlan]]) -> Iterable[ReferenceReport]:
             continue
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", RUNS)
 def test_each_combination_of_happenings_occurs(what: str) -> None:
     shows, may = RUNS[what]

@@ -181,6 +181,7 @@ def test_initial_tokens_make_a_ring_turn() -> None:
     assert sums == [11, 13, 16, END]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("P8")
 def test_a_parameter_is_set_by_a_token_before_the_function_runs_and_sent_behind_it() -> None:
     def build() -> hfg.Graph:
@@ -292,6 +293,7 @@ def test_a_slot_that_is_fed_by_an_output_holds_it_until_the_call_is_over() -> No
     assert second == [0.005]
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F7")
 @pytest.mark.parametrize("release", ["auto", "sequential", "pipelined"])
 def test_what_is_sent_depends_neither_on_the_schedule_nor_on_modes(release: Any) -> None:
@@ -632,6 +634,7 @@ def iterating() -> hfg.Graph:
     return graph
 
 
+@pytest.mark.slow
 @pytest.mark.rule("G4")
 def test_an_iterating_subgraph_gives_lists_of_what_came_out() -> None:
     found = every_schedule(
@@ -804,6 +807,7 @@ def show_all(value: list[list[int]]) -> None:
     """Take it."""
 
 
+@pytest.mark.slow
 @pytest.mark.rule("G3", "G4")
 def test_what_iterates_may_hold_what_iterates() -> None:
     def build() -> hfg.Graph:

@@ -148,6 +148,7 @@ def test_a_synchronous_graph_has_one_result() -> None:
     assert (found.outcomes, found.results) == ({"done": 20}, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("F7", "R5")
 def test_when_a_source_for_ended_nodes_is_given_up_is_no_result() -> None:
     def build() -> hfg.Graph:
@@ -217,6 +218,7 @@ def test_an_exploration_can_be_compared_with_the_oracle() -> None:
 # --- strategies
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(graphs(), schedules())
 def test_a_plan_builds_the_same_graph_each_time(plan: GraphPlan, seed: int) -> None:
@@ -225,6 +227,7 @@ def test_a_plan_builds_the_same_graph_each_time(plan: GraphPlan, seed: int) -> N
     assert list(first.nodes) == list(second.nodes)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(graphs())
 def test_a_plan_prints_as_the_program_that_builds_it(plan: GraphPlan) -> None:
@@ -283,6 +286,7 @@ def test_grouping_nodes_changes_nothing_that_others_can_see(seed: int) -> None:
     assert seen(plan) == seen(plan.flat())
 
 
+@pytest.mark.slow
 def test_hypothesis_shrinks_to_a_small_graph() -> None:
     small = find(
         graphs(),

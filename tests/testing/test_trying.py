@@ -215,6 +215,7 @@ def hangs(value: int) -> int:
     return value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind",
     [half, divides, divides_by_more, counting, sleeping, brightest, Relay, Held, AnyOf, Both, EachOfBoth],
@@ -233,6 +234,7 @@ def test_declared_errors_are_counted() -> None:
     assert (trial.refused > 0, trial.errors) == (True, ("ZeroDivisionError",))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "sentence"),
     [
@@ -284,6 +286,7 @@ def writes_beyond(value: int) -> int:
     return value
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)  # four processes that import all
 @pytest.mark.timeout(240)
 def test_a_type_that_ends_its_process_or_does_not_come_back_is_named_and_the_others_go_on() -> None:
@@ -299,6 +302,7 @@ def test_a_type_that_ends_its_process_or_does_not_come_back_is_named_and_the_oth
     assert faults[4] == "did not come back within 5 s of processor time"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc can look after its heap")
 def test_a_type_that_writes_beyond_its_memory_is_named_although_nothing_else_shows_it() -> None:
     first, second = try_all(named(writes_beyond, half))
@@ -306,6 +310,7 @@ def test_a_type_that_writes_beyond_its_memory_is_named_although_nothing_else_sho
     assert second.usable
 
 
+@pytest.mark.slow
 def test_types_are_shared_by_processes_and_told_in_their_order() -> None:
     kinds = (half, divides, leaves, brightest, counting)
     one, two = (try_all(named(*kinds), processes=processes, confirm=False) for processes in (1, 2))
@@ -363,6 +368,7 @@ def test_who_dies_behind_others_is_tried_alone_and_then_those_before_it(
     assert processes.asked == asked
 
 
+@pytest.mark.slow
 def test_the_command_tells_what_is_not_usable(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

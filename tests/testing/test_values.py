@@ -174,6 +174,7 @@ def found(strategy: st.SearchStrategy[Any], wanted: Callable[[Any], bool]) -> bo
     return any(seen)
 
 
+@pytest.mark.slow
 def test_values_are_of_many_kinds() -> None:
     """A strategy that only gave zeros would fit every hint."""
     assert found(values_of(float), lambda value: value != value)
@@ -187,6 +188,7 @@ def test_values_are_of_many_kinds() -> None:
     assert found(values_of(Annotated[int, Gt(5_000_000)]), lambda value: value > 5_500_000)
 
 
+@pytest.mark.slow
 def test_most_arrays_of_a_firing_are_alike() -> None:
     alike = Alike(channels=3, dtype=np.float32)
     both = st.tuples(values_of(images.AnyImage, alike=alike), values_of(images.AnyImage, alike=alike))
@@ -245,6 +247,7 @@ def test_what_nobody_can_make_is_named() -> None:
         check()
 
 
+@pytest.mark.slow
 def test_examples_in_docstrings_run() -> None:
     assert doctest.testmod(hfg.testing.values).failed == 0
     assert typing.get_args(Span[int]) == (int,)

@@ -68,6 +68,7 @@ def test_a_call_and_a_firing_by_one_sending_are_one_turn() -> None:
     replay_depth_first(called_and_fired, seen)
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R2")
 @pytest.mark.parametrize("block", range(4))
 def test_waves_of_random_graphs_go_depth_first(block: int) -> None:

@@ -40,12 +40,14 @@ def check(refused: Path, *command: str) -> None:
     assert found == expected, f"not refused: {sorted(expected - found)}, refused: {sorted(found - expected)}\n{output}"
 
 
+@pytest.mark.slow
 @pytest.mark.rule("P1", "P3")
 @pytest.mark.timeout(300)  # without a cache mypy reads numpy and reactivex first
 def test_mypy_sees_wrong_types_and_directions(refused: Path) -> None:
     check(refused, "mypy", "--strict", "--no-error-summary")
 
 
+@pytest.mark.slow
 @pytest.mark.rule("P1", "P3")
 @pytest.mark.timeout(300)
 def test_pyright_sees_wrong_types_and_directions(refused: Path) -> None:

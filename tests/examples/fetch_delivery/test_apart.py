@@ -16,6 +16,8 @@ from examples.fetch_delivery.world import Simulation
 from hfg.recording import File, play_into
 from hfg.trace import ActivityChanged, EventTriggered, TraceEvent
 
+pytestmark = pytest.mark.slow
+
 SHARED = Path("/dev/shm")
 
 

@@ -25,6 +25,7 @@ def said(result: Result) -> str:
     return re.sub(r"[\s│]+", " ", result.output)
 
 
+@pytest.mark.slow
 def test_the_score_of_each_robot_is_told() -> None:
     result = command("--minutes", "0.02", "--robots", "2")
     assert result.exit_code == 0

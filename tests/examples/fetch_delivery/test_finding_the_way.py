@@ -105,6 +105,7 @@ def around(robot: Robot, steps: int, radius: float = 4.0) -> list[Any]:
     return [np.array([radius * math.cos(at), radius * math.sin(at), at]) for at in angles]
 
 
+@pytest.mark.slow
 def test_once_around_the_arena_the_robot_knows_where_it_is_and_where_all_stations_are() -> None:
     """A drifting robot at 0.6 m/s: within 5 cm and 2 degrees all the time, signs within 15 cm, nothing touched."""
     world = Simulation(3)
@@ -136,6 +137,7 @@ def test_once_around_the_arena_the_robot_knows_where_it_is_and_where_all_station
         assert abs(math.remainder(found.theta - facing, 2 * math.pi)) < 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_wherever_a_robot_starts_it_finds_its_place_at_once(seed: int) -> None:
     """Among four robots, for five seconds of wild driving: within 5 cm and 2 degrees from the first scan on."""
@@ -156,6 +158,7 @@ def test_wherever_a_robot_starts_it_finds_its_place_at_once(seed: int) -> None:
         assert max(turned for *_, turned in robot.errors) < math.radians(2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fault",
     [
@@ -326,6 +329,7 @@ def test_a_path_leads_behind_one_who_crosses() -> None:
         assert (at < 3.0).all() if vy > 0 else (at > 4.0).all()
 
 
+@pytest.mark.slow
 def test_who_finds_somebody_at_the_station_waits_at_a_distance_until_it_is_free() -> None:
     """The goal is 1.25 m before a station on the wall; somebody stands at the station, backs off and leaves."""
     planner, follower = PlanPath(lane=0.9, every=1), FollowPath()
@@ -429,6 +433,7 @@ def test_a_robot_that_has_gone_behind_is_remembered_in_the_map_and_in_the_own_fr
     assert fire(node, seen=[], scan=robot.scan, localised=lost).outputs == {"others": [], "around": []}
 
 
+@pytest.mark.slow
 def test_two_robots_that_drive_at_each_other_pass_without_touching() -> None:
     world = Simulation(4, robots=2)
     ends = [np.array([-2.2, 3.6, 0.0]), np.array([2.2, 3.6, math.pi])]

@@ -326,6 +326,7 @@ def test_tables_go_into_a_page_between_their_marks() -> None:
         compare.put_into("a page", "counted", "| new |")
 
 
+@pytest.mark.slow
 def test_missions_of_both_sorts_are_measured() -> None:
     runs = [compare.mission(sort, 3, 0.02) for sort in compare.KINDS]
     assert [(run["sort"], run["seed"], run["delivered"]) for run in runs] == [("activity", 3, 0), ("machine", 3, 0)]
@@ -372,6 +373,7 @@ def test_nothing_is_wrong_with_the_graph_around_it() -> None:
     assert [problem for problem in build(1, 4, kind=Robot).check() if problem.severity != "hint"] == []
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)
 def test_it_fetches_a_cube_and_keeps_to_what_is_demanded_of_the_graph_too() -> None:
     watch = watched(seed=1, minutes=0.41)

@@ -261,6 +261,7 @@ def minutes() -> Watch:
     return watched(seed=1, minutes=3.0)
 
 
+@pytest.mark.slow
 def test_in_its_first_minutes_a_robot_delivers_cubes_by_what_it_sees_itself(minutes: Watch) -> None:
     (score,) = minutes.simulation.scores
     assert len(score.delivered) >= 3
@@ -299,6 +300,7 @@ def began(watch: Watch, step: str) -> float:
 # Up to the fault the robot does what it does in its minutes without one: that says when and where something goes wrong.
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)
 def test_a_blocked_station_is_left_and_another_one_served(minutes: Watch) -> None:
     """A crate is put before the station to which the robot is on its way."""
@@ -311,6 +313,7 @@ def test_a_blocked_station_is_left_and_another_one_served(minutes: Watch) -> Non
     assert served != blocked
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)
 def test_where_no_operator_comes_the_robot_leaves_in_time_and_goes_elsewhere(minutes: Watch) -> None:
     began_s, _, left_alone = minutes.waits[0]
@@ -322,6 +325,7 @@ def test_where_no_operator_comes_the_robot_leaves_in_time_and_goes_elsewhere(min
     assert served != alone == left_alone
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)
 def test_a_cube_that_cannot_be_read_is_reported_and_given_back_for_another_one(minutes: Watch) -> None:
     until_s = minutes.waits[0][0] + 50
@@ -331,6 +335,7 @@ def test_a_cube_that_cannot_be_read_is_reported_and_given_back_for_another_one(m
     assert (len(score.fetched), len(score.returned)) == (2, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)
 @pytest.mark.parametrize("name", ["pushed robot", "lost localisation"])
 def test_a_robot_that_is_not_where_it_thinks_finds_itself_while_it_drives(minutes: Watch, name: str) -> None:
@@ -367,6 +372,7 @@ def story(seed: int) -> str:
     return hashlib.sha256(repr((watch.steps, robot.x, robot.y, robot.theta)).encode()).hexdigest()
 
 
+@pytest.mark.slow
 @pytest.mark.rule("R6")
 @pytest.mark.timeout(180)
 def test_equal_seeds_give_equal_missions_in_another_process_with_another_hash_seed() -> None:

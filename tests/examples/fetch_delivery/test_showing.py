@@ -69,6 +69,7 @@ def noise(size: tuple[int, int], seed: int) -> Any:
 # --- the report
 
 
+@pytest.mark.slow
 def test_a_report_has_video_ways_pictures_and_the_mission_in_one_file(tmp_path: Path) -> None:
     showing, _ = shown(tmp_path / "deep" / "down", 2.0, robots=2)
     assert (showing.notes, showing.is_whole) == ([], True)
@@ -83,6 +84,7 @@ def test_a_report_has_video_ways_pictures_and_the_mission_in_one_file(tmp_path: 
     assert not re.search(r'(src|href)="(?!data:)', page)
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_a_whole_report_of_what_there_was(tmp_path: Path) -> None:
     def press(_run: hfg.Run) -> None:
         asyncio.get_running_loop().call_later(1.5, signal.raise_signal, signal.SIGINT)
@@ -115,6 +117,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_anything_runs(tmp_pat
     assert "File exists; name a folder that you can write to" in said
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full is needed")
 def test_a_disk_that_is_full_is_told_and_the_score_is_said(tmp_path: Path) -> None:
     for name in ("report.html", "video.webm", "ways.svg"):
@@ -161,6 +164,7 @@ def test_with_neither_of_them_that_is_said_and_no_file_is_left(tmp_path: Path, m
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of processes are needed")
 def test_a_video_that_breaks_off_is_kept_as_far_as_it_goes_and_told(tmp_path: Path) -> None:
     program = """

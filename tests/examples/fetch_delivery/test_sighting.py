@@ -50,6 +50,7 @@ def facing_error(view: View, one: Sighting) -> float:
     return abs(math.remainder(one.facing - math.pi - view.turned, 2 * math.pi))
 
 
+@pytest.mark.slow
 def test_bullseyes_are_placed() -> None:
     """100 views, 0.5 to 4 m: 97 % found, range within 3 %, bearing 3 mrad; facing 9 degrees where known."""
     drawn = photographs(1, 100, 0.5, 4.0, digits=False)
@@ -64,6 +65,7 @@ def test_bullseyes_are_placed() -> None:
     assert max(known) < 0.16
 
 
+@pytest.mark.slow
 def test_digits_are_read_and_placed() -> None:
     """150 views, 1.7 to 6.5 m: 97 % read, none wrong, range within 2 %, bearing within 4 mrad."""
     drawn = photographs(2, 150, 1.7, 6.5, digits=True)
@@ -126,6 +128,7 @@ def basket(rng: np.random.Generator, station: int, *, scratched: bool = False) -
     return np.clip(np.rint(image + rng.normal(0, 4, image.shape)), 0, 255).astype(np.uint8)
 
 
+@pytest.mark.slow
 def test_cubes_are_read_and_never_wrongly() -> None:
     """60 cubes: 95 % are read, none wrongly; those that are not are said to be unreadable, not gone."""
     rng = np.random.default_rng(6)
@@ -137,6 +140,7 @@ def test_cubes_are_read_and_never_wrongly() -> None:
     assert sum(one.state == "number" for one in found) >= 0.95 * len(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("light", [0.5, 0.7, 0.75, 0.8, 1.0, 1.2, 1.3])
 def test_dim_and_bright_light_hide_no_cube_and_show_none_that_is_not_there(light: float) -> None:
     """24 cubes and 4 empty baskets for each light: nearly all are read, none is missed or misread."""
@@ -156,6 +160,7 @@ def test_dim_and_bright_light_hide_no_cube_and_show_none_that_is_not_there(light
     assert {seen(None, number) for number in range(4)} == {Cube("none")}
 
 
+@pytest.mark.slow
 def test_no_cube_and_a_scratched_one_are_told_apart() -> None:
     rng = np.random.default_rng(7)
     assert {cube.read_cube.function(basket(rng, 0)) for _ in range(8)} == {Cube("none")}

@@ -247,6 +247,7 @@ def test_turning_blurs_a_picture() -> None:
     assert across[0].max() > 80 > 60 > across[1].max()
 
 
+@pytest.mark.slow
 def test_nearly_every_cube_that_lies_well_can_be_read_and_no_smeared_one() -> None:
     renderer, reader = Renderer(Arena()), cv2.barcode.BarcodeDetector()
     operator = Operator(np.random.default_rng(7))
@@ -276,6 +277,7 @@ def wait_for_handover(simulation: Simulation, at_most_s: float = 20.0) -> float 
     return took_s if simulation.cube(0) != cube else None
 
 
+@pytest.mark.slow
 def test_operators_react_within_two_to_ten_seconds_but_now_and_then_later_or_not_at_all() -> None:
     operator, arena = Operator(np.random.default_rng(1)), Arena()
     station = arena.station("filling", 0)
@@ -399,6 +401,7 @@ def digest(seed: int) -> str:
     return text.hexdigest()
 
 
+@pytest.mark.slow
 def test_equal_seeds_give_equal_worlds_in_another_process_with_another_hash_seed() -> None:
     root = Path(__file__).parents[3]
     program = "from tests.examples.fetch_delivery.test_world import digest; print(digest(4), digest(5))"

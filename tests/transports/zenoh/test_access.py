@@ -40,10 +40,12 @@ async def system(open_one: Open, certificates: Certificates) -> AsyncIterator[Sy
     yield System(*sessions)
 
 
+@pytest.mark.slow
 async def test_the_agent_knows_its_clients_by_their_certificates(system: System) -> None:
     assert [one.certificate for one in system.viewer.connections()] == ["agent"]
 
 
+@pytest.mark.slow
 async def test_a_viewer_sees_values_and_who_is_there_and_asks_for_what_may_be_read(system: System) -> None:
     values: asyncio.Queue[Message] = asyncio.Queue()
     presences: asyncio.Queue[Presence] = asyncio.Queue()
@@ -73,6 +75,7 @@ async def answered(session: ZenohSession, name: str) -> bytes:
                 await asyncio.sleep(0.01)
 
 
+@pytest.mark.slow
 async def test_what_a_viewer_would_write_reaches_nobody(system: System) -> None:
     steered: list[str] = []
 

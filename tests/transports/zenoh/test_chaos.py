@@ -23,6 +23,8 @@ from tests.transports.chaos import Gremlin, Proxy
 from tests.transports.zenoh import workers
 from tests.transports.zenoh.conftest import free_port
 
+pytestmark = pytest.mark.slow
+
 OUTAGE_S = 1.4 * workers.LEASE_S
 """Longer than the lease: all sides give each other up."""
 

@@ -37,6 +37,7 @@ def test_a_key_that_would_end_the_process_is_refused() -> None:
         join("hfg", "x" * LONGEST_KEY)
 
 
+@pytest.mark.slow
 @given(NAME, st.binary(max_size=200))
 def test_a_presence_says_its_name_and_metadata_and_is_found_by_each_of_its_prefixes(name: str, metadata: bytes) -> None:
     prefix = Keys("realm").presences

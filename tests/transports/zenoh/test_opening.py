@@ -131,11 +131,13 @@ def meeting(certificates: Certificates, theirs: Tls, ours: Tls, host: str = "loc
     return said.removeprefix(f'cannot connect to "tls/{host}:{port}": ')
 
 
+@pytest.mark.slow
 def test_their_certificate_has_expired(certificates: Certificates) -> None:
     said = meeting(certificates, certificates.tls("expired"), certificates.tls("worker"))
     assert said == "the certificate there has expired; make new ones by hfg keys new"
 
 
+@pytest.mark.slow
 def test_their_certificate_is_for_another_host(certificates: Certificates) -> None:
     said = meeting(certificates, certificates.tls("elsewhere"), certificates.tls("worker"))
     assert said == (
@@ -144,17 +146,20 @@ def test_their_certificate_is_for_another_host(certificates: Certificates) -> No
     )
 
 
+@pytest.mark.slow
 def test_their_certificate_is_of_another_authority(certificates: Certificates) -> None:
     theirs = certificates.tls("agent", folder=certificates.other)
     said = meeting(certificates, theirs, certificates.tls("worker"))
     assert said == "the certificate there was signed by another authority; use keys that were made together"
 
 
+@pytest.mark.slow
 def test_our_certificate_has_expired(certificates: Certificates) -> None:
     said = meeting(certificates, certificates.tls("agent"), certificates.tls("expired"))
     assert said == "our certificate has expired; make new ones by hfg keys new"
 
 
+@pytest.mark.slow
 def test_our_certificate_is_of_another_authority(certificates: Certificates) -> None:
     ours = certificates.tls("worker", folder=certificates.other)
     said = meeting(certificates, certificates.tls("agent"), ours)
@@ -163,6 +168,7 @@ def test_our_certificate_is_of_another_authority(certificates: Certificates) -> 
     )
 
 
+@pytest.mark.slow
 def test_a_file_of_the_certificates_is_missing_or_none(certificates: Certificates, tmp_path: Path) -> None:
     nowhere = str(tmp_path / "nowhere.pem")
     text = tmp_path / "text.pem"
