@@ -110,15 +110,15 @@ class Divergence(AssertionError):
 
 
 def replay(build: Any, events: Iterable[TraceEvent], *, until_s: float | None = None) -> None:
-    """Check the trace of a whole run, from its first event to its last.
+    """Check the trace of a complete run against the reference oracle, event by event.
 
     Args:
-      build: makes the graph that was run, afresh; a graph itself will do too.
+      build: a function that returns a new graph equal to the one that ran, or that graph.
       events: all events of the run.
-      until_s: as it was given to the run.
+      until_s: the value that was given to the run.
 
     Raises:
-      Divergence: at the first event that the rules do not explain.
+      Divergence: the rules do not explain an event; the error names the first one.
 
     Examples:
       >>> import hfg
@@ -139,7 +139,7 @@ def replay(build: Any, events: Iterable[TraceEvent], *, until_s: float | None = 
 
 
 class Replay:
-    """A reference machine beside a run; `see` its events one by one as they come."""
+    """A reference machine that follows a run. Pass it each event with `see`."""
 
     def __init__(self, graph: Any, *, until_s: float | None = None, held_open: bool = False) -> None:
         self.machine = ReferenceMachine(graph, until_s=until_s, held_open=held_open)

@@ -85,20 +85,22 @@ def explore(
     """Run a graph under many seeded schedules in virtual time.
 
     Args:
-      build: makes the graph, afresh for every run.
-      runs: how many schedules, 1 at least.
-      invariants: functions over traces that give sentences about what is wrong, or `assert` what is right; by default
-        all of `hfg.testing.invariants`.
-      result: what must be the same for every schedule; by default how the run ended and, if the graph has synchronous
-        edges alone, every sequence of
-        tokens that somebody had a use for (rule F7).
-      seed: of the seeds.
-      until_s: ends every run at that time.
-      conform: also compares each run with the reference oracle.
-      debug: checks every value against the type of its port, and that shared values are not changed.
+      build: a function that returns a new graph for every run.
+      runs: number of schedules, at least 1.
+      invariants: functions that take a trace and return a description of each problem, or use `assert`. Default: all of
+        `hfg.testing.invariants`.
+      result: a function that takes a trace and returns what must be the same for every schedule. Default: how the run
+        ended and, if the graph has only synchronous edges, the sequences of tokens that were used (rule F7).
+      seed: seed of the schedules.
+      until_s: end every run at this time.
+      conform: also compare each run with the reference oracle.
+      debug: check every value against the type of its port, and that shared values are not modified.
+
+    Returns:
+      Counts of runs, outcomes and results.
 
     Raises:
-      ScheduleFailure: with the shortest of the schedules that fail.
+      ScheduleFailure: a schedule fails; the error has the shortest one that was found.
       UsageError: there is nothing to explore.
 
     Examples:

@@ -71,25 +71,28 @@ def fire(
     debug: bool = True,
     **values: Any,
 ) -> Firing:
-    """Run one firing of a node, one call of a slot, or one hook; state is kept from one to the next.
+    """Run one firing of a node, one slot call, or one hook. The node's state is kept between calls.
 
-    `setup()` runs before the first. A value may be a token where the node wants to see one. A generator gives its next
-    value with each firing. A node that is in no graph has the place "name of its type" meanwhile.
+    `setup()` runs before the first call. A value can be a token. A generator yields its next value at each firing. A
+    node that is not in a graph goes by the name of its type.
 
     Args:
-      node: belongs to no run at the moment.
-      *unnamed: refused: values go by the names of inputs.
-      slot: calls this slot instead, with `value=`, if it takes one.
-      hook: runs this hook instead: "end", "teardown", "on_activated", "do" ...; behind "do", which runs to its end,
-        the event `completed` is among the events.
-      active: what `node.active` says from now on.
-      parameters: are set before.
-      debug: checks what goes in and comes out against the types of the ports.
-      values: by input; those left out must be optional.
+      node: a node that is not running at the moment.
+      *unnamed: not allowed; pass values by the names of inputs.
+      slot: call this slot instead, with `value=` if it takes a value.
+      hook: run this hook instead: "end", "teardown", "on_activated", "do" and so on. "do" runs to its end, and its
+        event `completed` is among the events.
+      active: the value of `node.active` from now on.
+      parameters: parameters to set first, by name.
+      debug: check values and results against the types of the ports.
+      **values: the values by input; only optional inputs can be omitted.
+
+    Returns:
+      The values by output, the events with their values, and whether the node has ended.
 
     Raises:
-      UsageError: an input is missing or unknown, or an output was written twice; it is no node, or no hook of one.
-      TypeError: the result does not fit the outputs, or a value its port.
+      UsageError: an input is missing or unknown, an output was written twice, or the node has no such slot or hook.
+      TypeError: the result does not fit the outputs, or a value does not fit its port.
 
     Examples:
       >>> import hfg

@@ -24,7 +24,7 @@ E = TypeVar("E", bound=TraceEvent)
 
 
 class Recorder(list[TraceEvent]):
-    """A list of trace events that can be given to a run as `trace=`.
+    """A list of trace events, with queries. Pass it to a run as `trace=`.
 
     Examples:
       >>> import hfg
@@ -47,37 +47,37 @@ class Recorder(list[TraceEvent]):
         return [event for event in self if isinstance(event, kind)]
 
     def edges(self) -> list[str]:
-        """Return the labels of all edges that something was sent over, in order of first use."""
+        """Return the labels of all edges that tokens were sent over, in order of first use."""
         return list(dict.fromkeys(event.edge for event in self.of(TokenSent)))
 
     def tokens(self, edge: str) -> list[Token[Any]]:
-        """Return every token that was put on an edge; a label may be cut short to its source, "camera.out"."""
+        """Return every token that was put on an edge, given by its label or only its source, "camera.out"."""
         labels = self._labels(edge)
         first = labels[:1]
         return [event.token for event in self.of(TokenSent) if event.edge in first]
 
     def values(self, edge: str) -> list[Any]:
-        """Return values and markers on an edge."""
+        """Return the values and markers that were put on an edge."""
         return [token.value for token in self.tokens(edge)]
 
     def signals(self, event: str) -> list[Any]:
-        """Return the values of an event's signals, whether anybody was connected or not."""
+        """Return the values of an event's signals, even if nothing was connected."""
         return [one.token.value for one in self.of(EventTriggered) if one.event == event]
 
     def taken(self, edge: str) -> list[Any]:
-        """Return what firings and calls took from an edge."""
+        """Return the values that firings and calls took from an edge."""
         return [event.token.value for event in self.of(TokenTaken) if event.edge in self._labels(edge)]
 
     def dropped(self, edge: str) -> list[Any]:
-        """Return what was discarded on an edge."""
+        """Return the values that were dropped on an edge."""
         return [event.token.value for event in self.of(TokenDropped) if event.edge in self._labels(edge)]
 
     def drained(self, edge: str) -> list[Any]:
-        """Return what was processed without anybody taking it."""
+        """Return the values that were drained on an edge (F12)."""
         return [event.token.value for event in self.of(TokenDrained) if event.edge in self._labels(edge)]
 
     def firings(self, node: str) -> int:
-        """Count the firings of a node, silent ones included."""
+        """Return the number of firings of a node, including silent ones."""
         return sum(event.node == node for event in self.of(FiringStarted))
 
     def calls(self, node: str) -> list[str]:
@@ -85,13 +85,13 @@ class Recorder(list[TraceEvent]):
         return [event.slot for event in self.of(CallStarted) if event.node == node]
 
     def activity(self, node: str | None = None) -> list[tuple[float, str, bool]]:
-        """Return each change of A(v): when, which node, its new value; of one node or of all."""
+        """Return each change of activity as (time, node, active), of one node or of all nodes."""
         return [
             (event.time, event.node, event.active) for event in self.of(ActivityChanged) if node in (None, event.node)
         ]
 
     def active_at_end(self) -> list[str]:
-        """Return the nodes that were left active."""
+        """Return the nodes that were active at the end."""
         state = {event.node: event.active for event in self.of(ActivityChanged)}
         return [node for node, active in state.items() if active]
 

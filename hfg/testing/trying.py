@@ -70,19 +70,21 @@ def try_type(
 ) -> Trial:
     """Fire a node type several times, with values generated from the types and limits that it declares.
 
-    Several nodes are made, with parameters by default and with generated ones, and each is fired `firings` times in a
-    row; slots are called in between. The same seed gives the same values. Meanwhile the working directory is a folder
-    with a few small files, from which paths are drawn.
+    Several nodes are made, with default and generated parameters; each fires `firings` times, and slots are called in
+    between. The same seed gives the same values. During the trial, the working directory is a folder with a few small
+    files, and generated paths point into it.
 
     Args:
       type_: a reference, "my_robot.nodes:MapLookup", or the type itself.
-      firings: of each node.
-      seed: other values with each.
-      shrink: looks for the simplest values that show the fault.
+      firings: number of firings per node.
+      seed: seed of the values.
+      shrink: search for the simplest values that show the fault.
+
+    Returns:
+      The trial: what was tried, and how it went.
 
     Raises:
-      NotUsable: a result of another type than declared, an error that is not declared, or no firing at all that went
-        well.
+      NotUsable: a result has another type than declared, an error is not declared, or no firing succeeded.
 
     Examples:
       >>> @hfg.node
