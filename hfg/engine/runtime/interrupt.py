@@ -26,7 +26,7 @@ from hfg.engine.runtime.lifetime import Lifetime
 from hfg.errors import HfgError
 from hfg.graph import Graph
 
-__all__ = ["CtrlC"]
+__all__ = ["CtrlC", "named"]
 
 _BREAK_IN_AFTER_S = 0.6
 _LEAVE_AFTER_S = 1.8
