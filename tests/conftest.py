@@ -1,7 +1,7 @@
 """The ordinary suite is the same each time; `make soak` draws examples that nobody has seen.
 
-With `--fuse-after 0` all runs fuse their regions from the first firing on. `--fast` takes half a minute: it runs the first
-cases of each test that is not marked `slow`.
+With `--fuse-after 0` all runs fuse their regions from the first firing on. `--fast` takes half a minute: it runs the
+first cases of each test that is not marked `slow`.
 """
 
 from __future__ import annotations

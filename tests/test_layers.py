@@ -7,7 +7,6 @@ The table says which floor a module or package stands on; every import statement
 from __future__ import annotations
 
 import ast
-import functools
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +14,8 @@ from pathlib import Path
 import pytest
 
 from hfg.graph.flat.order import rings, shortest_ring
+from tools import imports
+from tools.imports import modules, parsed
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -104,18 +105,10 @@ WAITING = {"asyncio", "anyio", "trio"}
 ORACLE_MUST_NOT_SHARE = ("hfg.ports", "hfg.activity", "hfg.engine")
 
 
-def modules(folder: str, source: Path) -> dict[str, Path]:
-    """Return every module below `source/folder` by its dotted name."""
-    found = {}
-    for file in sorted((source / folder).rglob("*.py")):
-        parts = file.relative_to(source).with_suffix("").parts
-        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = file
-    return found
-
-
 HFG = modules("hfg", ROOT)
 TRANSPORTS = modules("hfg_transports", ROOT / "transports")
 ALL = HFG | TRANSPORTS
+KNOWN = frozenset(ALL)
 
 
 def home(module: str, table: Mapping[str, int] = FLOORS) -> str | None:
@@ -128,40 +121,9 @@ def home(module: str, table: Mapping[str, int] = FLOORS) -> str | None:
     return None
 
 
-def for_types_only(tree: ast.AST) -> set[int]:
-    """Give the lines of a file that are under `if TYPE_CHECKING`: they name and do not import."""
-    blocks = [one for one in ast.walk(tree) if isinstance(one, ast.If) and "TYPE_CHECKING" in ast.unparse(one.test)]
-    return {line for block in blocks for one in block.body for line in range(one.lineno, (one.end_lineno or 0) + 1)}
-
-
-@functools.cache
-def parsed(file: Path) -> ast.Module:
-    return ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
-
-
-@functools.cache
 def imported(module: str, file: Path, *, named: bool = True) -> tuple[tuple[str, int], ...]:
-    """Return the full names of the modules that the file imports, with the line; relative imports are resolved.
-
-    Without `named` those are left out that are for type checkers alone.
-    """
-    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
-    tree, found = parsed(file), list[tuple[str, int]]()
-    left_out = set() if named else for_types_only(tree)
-    for statement in ast.walk(tree):
-        if getattr(statement, "lineno", 0) in left_out:
-            continue
-        if isinstance(statement, ast.Import):
-            found += [(alias.name, statement.lineno) for alias in statement.names]
-        elif isinstance(statement, ast.ImportFrom):
-            base = statement.module or ""
-            if statement.level:
-                anchor = package.split(".")[: len(package.split(".")) - statement.level + 1]
-                base = ".".join([*anchor, base] if base else anchor)
-            # `from hfg import graph` imports hfg.graph, `from hfg import Graph` the door
-            names = [f"{base}.{alias.name}" for alias in statement.names]
-            found += [(name, statement.lineno) for name in {name if name in ALL else base for name in names}]
-    return tuple(found)
+    """Return what the file imports, with the line; without `named`, imports for type checkers only are left out."""
+    return imports.imported(module, file, KNOWN, named=named)
 
 
 def violations(module: str, file: Path) -> list[str]:
