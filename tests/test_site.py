@@ -122,7 +122,7 @@ def digest(folder: Path) -> dict[str, str]:
     }
 
 
-@pytest.mark.soak
+@pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_every_page_and_every_public_name_is_in_the_site(site: Path) -> None:
     assert build_docs.problems(site) == []
