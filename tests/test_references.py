@@ -235,3 +235,11 @@ def test_documents_whose_sections_are_named_exist() -> None:
 )
 def test_references_are_seen(pattern: re.Pattern[str], text: str, found: list[str]) -> None:
     assert [name for name in pattern.findall(text) if name != "U16"] == found
+
+
+def test_the_glossary_has_every_term_of_the_rules() -> None:
+    table = re.search(r"^## Terms$.*?^## T: ", (ROOT / "docs/semantics.md").read_text(encoding="utf-8"), re.M | re.S)
+    assert table is not None
+    terms = {term for row in re.findall(r"^\| \*\*([^*]+)\*\*", table[0], re.M) for term in row.split(", ")}
+    glossary = (ROOT / "docs/glossary.md").read_text(encoding="utf-8").lower()
+    assert not {term for term in terms - {"A(v)", "a"} if term not in glossary}
