@@ -89,7 +89,8 @@ def _fence(match: re.Match[str], folder: str) -> str:
     for _, file in variants:
         if not (STAGED / file).exists():
             sys.exit(f"a Mermaid diagram has changed, and docs/{file} is missing: run `make docs-mermaid`")
-    return "\n".join(f"![Diagram]({up}{file}#only-{variant})" for variant, file in variants)
+    *_, heading = re.findall(r"^#+ (.+)$", match.string[: match.start()], re.M)
+    return "\n".join(f"![Diagram: {heading}]({up}{file}#only-{variant})" for variant, file in variants)
 
 
 def diagram_name(source: str) -> str:
