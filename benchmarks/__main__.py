@@ -28,6 +28,7 @@ SUITES = (
     "bench_live",
     "bench_observers",
     "bench_shape",
+    "bench_start",
     "bench_threads",
     "bench_virtual_day",
 )

@@ -14,7 +14,7 @@ import statistics
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from benchmarks import bench_goals, bench_links
+from benchmarks import bench_goals, bench_links, bench_start
 from benchmarks.figures import Records, caption, cell, figure, measured_on
 from benchmarks.goals import Goal, judge
 from benchmarks.measure import ROOT, Record, read
@@ -190,6 +190,8 @@ TABLES: dict[str, tuple[str, Callable[[Records], str]]] = {
     "shape": ("bench_shape", shape),
     "threads": ("bench_threads", threads),
     "goals": ("bench_goals", goals),
+    "start": ("bench_start", seconds),
+    "startgoals": ("bench_start", lambda records: goals(records, bench_start.GOALS)),
     "day": ("bench_virtual_day", seconds),
     "files": ("bench_files", seconds),
     "profile": ("profile_hop", profile),

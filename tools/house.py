@@ -1,7 +1,7 @@
 """Measures the source of hfg: how large it is, how its modules depend on each other, and how plain its functions are.
 
     python tools/house.py                       this tree
-    python tools/house.py --against 751ed90     another commit beside it; may be given several times
+    python tools/house.py --against 751ed90     another commit too; may be given several times
 
 Requires only Python 3.11 and, for other commits, git. Lines are lines of files, comments and blank lines included.
 """
@@ -112,7 +112,7 @@ def _layers(source: Path) -> set[int]:
 
 
 def edges(files: Mapping[str, Path]) -> set[tuple[str, str]]:
-    """Return which module imports which, also in functions and for type checkers."""
+    """Return which module imports which, including imports in functions and for type checkers."""
     known = frozenset(files)
     return {(name, other) for name, file in files.items() for other, _ in imported(name, file, known) if other in known}
 

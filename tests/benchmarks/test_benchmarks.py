@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks import bench_goals, bench_links, bench_peers, figures, page, profile_hop, threaded
+from benchmarks import bench_goals, bench_links, bench_peers, bench_start, figures, page, profile_hop, threaded
 from benchmarks.__main__ import SUITES
 from benchmarks.goals import Goal, Side, judge, verdicts
 from benchmarks.measure import BEFORE, ROOT, Record, measure, one, read, write
@@ -40,7 +40,7 @@ def cases() -> Iterator[tuple[str, str]]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("suite", "case"), list(cases()))
 def test_every_case_runs_at_a_tiny_size(suite: str, case: str) -> None:
-    figures = MODULES[suite].CASES[case].run(TOKENS if suite != "bench_threads" else 2)
+    figures = MODULES[suite].CASES[case].run({"bench_threads": 2, "bench_start": 1}.get(suite, TOKENS))
     values = list(figures.values()) if isinstance(figures, dict) else [figures]
     assert values
     assert all(math.isfinite(value) for value in values)
@@ -57,7 +57,7 @@ def test_every_peer_takes_part_or_is_named_as_missing() -> None:
         assert (peer in rows) != (f"{peer} is not installed" in bench_peers.MISSING), peer
 
 
-@pytest.mark.parametrize("suite", [bench_goals, bench_links])
+@pytest.mark.parametrize("suite", [bench_goals, bench_links, bench_start])
 def test_every_goal_has_its_cases_or_the_reason_why_not(suite: Any) -> None:
     assert suite.GOALS
     for goal in suite.GOALS:
