@@ -88,7 +88,7 @@ def test_no_drawing_is_left_over() -> None:
     }
     names = {f"{diagram_name(source)}.{variant}.svg" for source in diagrams() for variant in ("light", "dark")}
     kept = {file.name for file in (ROOT / "docs" / DIAGRAMS).glob("*.svg")}
-    assert kept == names, "a Mermaid diagram has changed: run `make docs-mermaid`"
+    assert kept == names, "a Mermaid diagram has changed: run `make docs-mermaid`, or python -m tools.draw_mermaid"
     assert set((ROOT / "docs").rglob("*.svg")) == shown | {ROOT / "docs" / DIAGRAMS / name for name in names}
 
 
