@@ -1,7 +1,8 @@
-"""A run whose graph is cut: the main part here, the others wherever a launcher has begun them (rules L1 to L3, R5).
+"""A run of a graph that is cut: the main part here, the others wherever a launcher has started them.
 
-It begins the others, sets them up together with its own, lets all go at one moment, sees to it that they agree on what
-follows from quiet, and ends them with the run. Stands on `worker`'s side of the conversation, `channels`.
+It starts the others, sets them up together with its own part, starts all of them at one moment, makes them agree on the
+consequences of quiet, and ends them with the run (rules L1 to L3, R5). Depends on `worker`'s side of the conversation
+and `channels`.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ __all__ = ["Distribution", "distribute"]
 Reported = TypeVar("Reported")
 
 _LOGGER = Log("hfg.parts")
-_PATIENCE_S = 1.0  # how long a signal that may be lost may be on its way, while nothing else moves
+_PATIENCE_S = 1.0  # how long a lossy signal may be in transit while nothing else moves
 _MOST_LOGGERS = 1000  # that other parts may use here
 _LEAVING_S = 7.0  # how long the others may take to tear down; one node may take five (X3)
 
@@ -101,17 +102,17 @@ class Distribution:
         modules: Mapping[str, str] | None = None,
         name: str = "",
     ) -> None:
-        """Prepare it; nothing has begun yet.
+        """Prepare the run; nothing is started yet.
 
         Args:
           flat: the whole graph.
-          cutting: of the graph.
+          cutting: how the graph is cut.
           text: the graph, as a file would have it.
           options: of the run, for the other parts.
-          launcher: begins these.
-          write: gives the text of the graph when it was edited.
-          modules: that they will import, each with a place in the graph that needs it.
-          name: what the run is called, if somebody has given it one.
+          launcher: starts them.
+          write: returns the text of the graph after an edit.
+          modules: modules that they will import, each with a place in the graph that needs it.
+          name: name of the run, if it has one.
         """
         self.flat: FlatGraph = cutting.parts[MAIN]
         self._drawing = Drawing(flat, cutting, text, write)
@@ -143,7 +144,7 @@ class Distribution:
             )
             for name in cutting.parts
         }
-        self._newest = FIRST_LIFE  # of all parts together: so a stream that begins later is higher on any link
+        self._newest = FIRST_LIFE  # of all parts together, so that a stream that starts later is higher on any link
 
     # --- the beginning ----------------------------------------------------------------------------------------------
 
@@ -163,7 +164,7 @@ class Distribution:
         composition.engine.callbacks.finished.append(self._ended_here)
 
     def face(self, graph: Graph) -> Run:
-        """Give what one can do with the whole."""
+        """Return the interface to the whole run."""
         composition = self._part.composition
         self._run_of_all = (
             CutRun(graph, composition, self._asking, self._drawing) if self._others else Run(graph, composition)
@@ -211,7 +212,10 @@ class Distribution:
         return self._drawing.cutting.parts[part].groups[part].host
 
     def _open_ledgers(self) -> None:
-        """A part of which something is kept is younger than all who begin anew: those tell it where they stand."""
+        """Open the ledgers.
+
+        A part with an entry counts as younger than all parts that start from scratch: they send it their positions.
+        """
         for name, where in keeping(self._drawing.cutting).items():
             self._ledgers[name] = ledger_of(where, name)
         kept = [name for name, ledger in self._ledgers.items() if ledger.entry is not None]
@@ -228,7 +232,7 @@ class Distribution:
         return Channel(self._session, self._run, MAIN, other.name, lives, partial(self._hear, other))
 
     async def _launch(self, other: Other) -> None:
-        """Begin the process of a part and have it set up its nodes; it says when that is done."""
+        """Start the process of a part and have it set up its nodes; the part reports when this is done."""
         name = other.name
         lives = (self._lives[name], FIRST_LIFE)
         launched = await self._launcher.launch(self._run, name, self._host(name), lives)
@@ -243,7 +247,7 @@ class Distribution:
         self._say(name, Open(self._drawing.text, self._options, lives_of_all, clock, known, shares, calls, kept))
 
     def begin(self) -> None:
-        """All are set up: let them go, behind which the main part goes."""
+        """Start all parts after setup, the main part last."""
         self._has_begun = True
         for other in self._others.values():
             other.let_go()
@@ -274,7 +278,7 @@ class Distribution:
                 self._told(message)
             case Keep():
                 if other.name not in self._ledgers or other.is_keeping:
-                    raise Untrue("and has no ledger, or has not heard yet that what it said before is kept")
+                    raise Untrue("and has no ledger, or does not know yet that its previous data is stored")
                 other.keep(partial(self._keep, other.name, message.number, message.data))
             case Ended():
                 self._ended_there(other, message)
@@ -291,13 +295,13 @@ class Distribution:
         try:
             self._agreement.hear(message.answer)
         except msgspec.ValidationError as error:
-            raise Untrue(f"which is no answer to that question: {error}") from error
+            raise Untrue(f"which is not an answer to that question: {error}") from error
 
     def _need_own(self, other: Other, message: Message) -> None:
-        """A part speaks for itself, of what it has.
+        """Check that a part's message is about its own edges and nodes.
 
         Raises:
-          Untrue: it does not.
+          Untrue: it is not.
         """
         name = other.name
         match message:
@@ -314,10 +318,10 @@ class Distribution:
         if speaker != name:
             raise Untrue(f"for {name_of(speaker):.200}")
         if isinstance(message, Closed) and not other.is_leaving:
-            raise Untrue("and nobody has told it to go")
+            raise Untrue("and it has not been told to start")
 
     async def _keep(self, part: str, number: int, data: bytes, say: Callable[[Message], None]) -> None:
-        """Keep what a part has done, and tell it."""
+        """Store the data of a part, and confirm it."""
         ledger, entry = self._ledgers[part], Entry(self._newest, data)
         try:
             if ledger.is_slow and not self._part.engine.virtual:
@@ -353,9 +357,9 @@ class Distribution:
                 self._say(name, Finish(self._part.engine.outcome))
 
     def _ended_there(self, other: Other, message: Ended) -> None:
-        """Another part is over, for a reason of its own, or because it was told: so are all.
+        """Another part has ended, by itself or because it was told to; so all parts end.
 
-        Another takes the place of one whose process is made to leave, by its agent or for a restart.
+        Exception: a process that has to leave, because of its agent or a restart, is replaced by another one.
         """
         if message.outcome == "cancelled":
             return
@@ -364,7 +368,7 @@ class Distribution:
         self._asking.over(other.name)
 
     def _gone(self, other: Other, how: str) -> None:
-        """A process has ended that was not told to: another takes its place."""
+        """A process has ended that was not told to; another one takes its place."""
         self._agreement.leave(other.name)
         self._asking.gone(other.name, RunError(f'the process of group "{other.name}" is gone: {how}'))
         torn = self._torn_by(other.name)
@@ -378,13 +382,13 @@ class Distribution:
             self._asking.over(other.name)
             return
         if pause_s is None:
-            often = f"it died {LIMIT + 1} times within {WITHIN_S:g} s and is not begun again"
+            often = f"it died {LIMIT + 1} times within {WITHIN_S:g} s and is not restarted"
             error = RunError(f'the process of group "{other.name}" is gone: {how}; {often}: see what it ended with')
             other.answer(error)
             self._part.finish("failed", error)
             self._asking.over(other.name)
             return
-        _LOGGER.warning('the process of group "%s" is gone: %s; another begins in %g s', other.name, how, pause_s)
+        _LOGGER.warning('the process of group "%s" is gone: %s; a new one starts in %g s', other.name, how, pause_s)
         for what in self._uncounted(other.name):
             _LOGGER.warning('group "%s": %s', other.name, what)
         other.come_back(self._bring_back(other, pause_s))
@@ -393,15 +397,16 @@ class Distribution:
         return uncounted(self._drawing.cutting, name, self._ledgers) if self._has_begun else ()
 
     def _torn_by(self, name: str) -> str:
-        """Why the run cannot go on when a process is gone: joins would pair what does not belong together (L2)."""
+        """Return why the run cannot continue without a process: joins would pair unrelated tokens (L2)."""
         cutting = self._drawing.cutting
         if name in self._ledgers or not self._has_begun or cutting.parts[name].groups[name].may_misalign:
             return ""
         for one in components(cutting, self._ledgers)[name]:
             if one.cost == "unknown" and one.joined:
                 return (
-                    f'how many tokens are lost with it cannot be known, for {one.uncertain}, and "{one.joined}" would '
-                    "pair what does not belong together: give the group ledger=True, or may_misalign=True to go on"
+                    f"the number of tokens lost with it is unknown because {one.uncertain}, and "
+                    f'"{one.joined}" would pair tokens that do not belong together: give the group '
+                    "ledger=True, or may_misalign=True to continue"
                 )
         return ""
 
@@ -444,7 +449,7 @@ class Distribution:
             return
         if self._has_begun:
             other.let_go()
-        if self._part.engine.core.over:  # meanwhile, when nobody could tell it
+        if self._part.engine.core.over:  # over meanwhile, when no one could be told
             self._say(name, Finish(self._part.engine.outcome))
 
     async def close(self) -> None:
@@ -476,7 +481,7 @@ class Distribution:
         await self._launcher.close()
 
     def failure(self) -> HfgError | None:
-        """Give what the teardown of another part has failed with, if one did."""
+        """Return the error from the teardown of another part, if there was one."""
         for other in self._others.values():
             if other.report is not None and other.report.failed is not None:
                 return self._error(other.report.failed, other)
@@ -503,8 +508,8 @@ class Distribution:
                 continue
             if times := max(other.deaths.count, other.restarts):
                 errors.append(
-                    f'the process of group "{other.name}" was begun again {times} times; what it counted '
-                    "before is not in the report"
+                    f'the process of group "{other.name}" was restarted {times} times; its counts from before '
+                    "are not in the report"
                 )
                 errors += [f'group "{other.name}", each time: {what}' for what in self._uncounted(other.name)]
             nodes |= _own(found.nodes, homes, other.name)
@@ -531,20 +536,20 @@ class Distribution:
 def distribute(
     graph: Graph, flat: FlatGraph, options: Mapping[str, Any], *, virtual: bool, settings: str | None = None
 ) -> Distribution:
-    """Prepare the run of a graph that has groups with processes, or that others are to hear of.
+    """Prepare the run of a graph that has groups with processes, or that other programs can find.
 
-    In virtual time its parts share the loop, for the clocks of processes are real.
+    In virtual time its parts share the loop because processes have real clocks.
 
     Args:
-      graph: that is to run.
-      flat: the same.
+      graph: the graph to run.
+      flat: the same graph, flattened.
       options: of the run, for the other parts.
       virtual: whether it runs in virtual time.
-      settings: the file that says in which realm it runs; "" for the default, None for none but what its hosts need.
+      settings: the settings file, which sets its realm; "" for the default, None for none unless its hosts need one.
 
     Raises:
-      FileError: it cannot be told to another process.
-      TransportError: there is nothing to speak to one with.
+      FileError: it cannot be sent to another process.
+      TransportError: there is no way to communicate with one.
     """
     from hfg.files import text_of
     from hfg.files.building import modules_of
@@ -591,12 +596,12 @@ def _log(part: str, logged: Logged, loggers: set[str]) -> None:
         logged.logger, logged.level, logged.file, logged.line, "%s", (logged.text,), None, logged.function, extra
     )
     record.created = logged.created
-    with contextlib.suppress(Exception):  # a handler that raises harms nobody
+    with contextlib.suppress(Exception):  # a handler that raises does no harm
         logger.handle(record)
 
 
 def _known_packages() -> list[str]:
-    """What this program has imported, its other processes may."""
+    """Return the packages that this program has imported; its other processes may import them."""
     return sorted({name.partition(".")[0] for name in sys.modules})
 
 
@@ -605,19 +610,19 @@ def _all_nodes(cutting: Cutting) -> list[Any]:
 
 
 def _own(found: Mapping[str, Reported], homes: Mapping[str, str], part: str) -> dict[str, Reported]:
-    """What a part reports of itself, and of what is nobody's."""
+    """Return a part's report without items of other parts, but including items that belong to no part."""
     return {place: one for place, one in found.items() if homes.get(place, part) == part}
 
 
 def _places(flat: FlatGraph) -> Iterator[str]:
-    """Of what a part may report: its nodes, by path, and its edges, by label."""
+    """Yield the places that a part may report: its nodes, by path, and its edges, by label."""
     for one in flat.walk():
         yield from (node.path for node in one.nodes)
         yield from (edge.label for edge in one.edges)
 
 
 def _joined(edge: CutEdge, halves: Mapping[str, Mapping[str, EdgeReport]]) -> EdgeReport:
-    """What an edge has carried, of which each side knows a half."""
+    """Return the counts of an edge, of which each side has one half."""
     nothing = EdgeReport(sent=0, dropped=0, drained=0, untaken=0, grown=0)
     source = halves.get(edge.source, {}).get(edge.label, nothing)
     target = halves.get(edge.target, {}).get(edge.label, nothing)

@@ -20,7 +20,7 @@ _ELSE: Final = "install the package with it"
 
 
 def transport(name: str) -> Transport:
-    """Give the transport of this name.
+    """Return the transport with this name.
 
     Raises:
       TransportError: there is none, or it cannot be imported.
@@ -39,7 +39,7 @@ def transport(name: str) -> Transport:
     if isinstance(made, type):
         made = made()
     if not isinstance(made, Transport):
-        raise TransportError(f'the entry point "{name}" of {_GROUP} gives no transport but {made!r:.80}')
+        raise TransportError(f'the entry point "{name}" of {_GROUP} does not provide a transport, but {made!r:.80}')
     return made
 
 

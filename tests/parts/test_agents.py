@@ -200,7 +200,7 @@ def test_two_agents_of_one_name_that_did_not_see_each_other_get_nothing(world: W
             first.die()
             second.die()
 
-    with pytest.raises(TransportError, match='^2 agents are called "arm" .*end one, or give it another name'):
+    with pytest.raises(TransportError, match='^2 agents are named "arm" .*stop all but one, or rename one'):
         play(world, scene)
 
 
@@ -209,7 +209,7 @@ def test_an_agent_whose_name_is_taken_does_not_begin(world: World) -> None:
         await world.agent("arm")
         await Agent(await world.network.open(host="arm"), world.computers["arm"]).open()
 
-    with pytest.raises(TransportError, match='^another agent is called "arm" already .*give this one another name'):
+    with pytest.raises(TransportError, match='^another agent is already named "arm" .*give this one another name'):
         play(world, scene)
 
 
@@ -376,7 +376,7 @@ def test_who_looks_at_a_run_from_another_host_sees_its_table_and_no_port(world: 
     glance, tap = play(world, scene)
     assert glance.glance is not None
     assert glance.glance.graph == "chain"
-    assert tap.error == "what passes a port is told on the host of the main part alone: hfg tap there"
+    assert tap.error == "tokens at a port can be tapped only on the host of the main part: run hfg tap there"
 
 
 def test_types_of_the_program_itself_are_not_found_on_other_hosts(

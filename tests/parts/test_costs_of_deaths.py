@@ -74,7 +74,7 @@ def test_each_connected_part_of_a_group_has_its_own_cost() -> None:
     assert switched.uncertain == '"switched" may be disabled while it runs'
     first, second = costs_of_deaths(two_chains())
     assert first.what == "a death costs nothing"
-    assert 'it ends the run, for "pair" would pair what does not belong together' in second.what
+    assert 'it ends the run because "pair" would pair tokens that do not belong together' in second.what
     assert "ledger=True" in second.remedy
 
 
@@ -82,7 +82,7 @@ def test_each_connected_part_of_a_group_has_its_own_cost() -> None:
 def test_a_death_after_which_a_join_would_be_torn_ends_the_run_with_a_sentence(killed: Any) -> None:
     killed(at(0.03, "both"))
     with pytest.raises(
-        hfg.errors.RunError, match=r'"pair" would pair what does not belong together.*may_misalign=True'
+        hfg.errors.RunError, match=r'"pair" would pair tokens that do not belong together.*may_misalign=True'
     ):
         hfg.run(two_chains(), clock="virtual", until_s=30.0)
 
@@ -119,19 +119,19 @@ def into_a_ledger(*, joins: bool, **options: Any) -> hfg.Graph:
 @pytest.mark.rule("L2")
 def test_check_knows_that_a_ledger_does_not_count_what_is_lost_before_it() -> None:
     joined, *_ = costs_of_deaths(into_a_ledger(joins=True))
-    assert 'it ends the run, for "pair" would pair what does not belong together' in joined.what
+    assert 'it ends the run because "pair" would pair tokens that do not belong together' in joined.what
     assert (
         joined.why
-        == '"then.out -> pair.a" leads into group "keeps", whose ledger knows what has come and not what is lost'
+        == '"then.out -> pair.a" leads to group "keeps", whose ledger knows the tokens that have arrived but ' 'not the lost'
     )
     alone, *_ = costs_of_deaths(into_a_ledger(joins=False))
-    assert alone.what == "a death costs tokens, and nobody can know how many"
+    assert alone.what == "a death costs an unknown number of tokens"
 
 
 @pytest.mark.rule("L2")
 def test_a_join_behind_a_ledger_is_not_torn_by_a_death_before_it(killed: Any) -> None:
     killed(at(0.03, "loses"))
-    with pytest.raises(hfg.errors.RunError, match=r'"pair" would pair what does not belong together'):
+    with pytest.raises(hfg.errors.RunError, match=r'"pair" would pair tokens that do not belong together'):
         hfg.run(into_a_ledger(joins=True), clock="virtual", until_s=30.0)
 
 

@@ -158,7 +158,7 @@ def test_a_relay_that_dies_at_any_moment_loses_and_doubles_nothing(killed: Any, 
     report = hfg.run(chain(count=20), clock="virtual")
     assert made[0].lives == {"relay0": 2}
     assert report.outputs == {"out": [1000 + number for number in range(20)]}
-    assert any('the process of group "relay0" was begun again 1 times' in error for error in report.errors)
+    assert any('the process of group "relay0" was restarted 1 times' in error for error in report.errors)
 
 
 @pytest.mark.slow
@@ -293,7 +293,7 @@ def test_a_source_that_dies_begins_again_and_its_consumer_goes_on_with_what_come
     before = found.index(1000, 1)
     assert found[:before] == [1000 + number for number in range(before)]
     assert found[before:] == [1000 + number for number in range(20)]
-    again = f'edge "ticks.out -> relay.value": its source "ticks" began again, and repeats up to {before} tokens'
+    again = f'edge "ticks.out -> relay.value": its source "ticks" started over, and repeats up to {before} tokens'
     assert again in report.errors
 
 
@@ -325,7 +325,7 @@ def test_what_no_edge_counts_is_named_with_the_most_that_it_can_be(
     report = hfg.run(graph, clock="virtual")
     told = [error for error in report.errors if error.startswith('group "far", each time: ')]
     assert [one.removeprefix('group "far", each time: ') for one in told] == [
-        "up to 2 firings and slot calls under way were lost with it",
+        "up to 2 firings and slot calls in progress were lost with it",
         "up to 5 tokens on its own edges, signals not sent yet among them, were lost with it; more if queues had grown",
         "start was triggered in it again, with 1 signal: activity that had left it may exist once more for each",
     ]

@@ -134,4 +134,4 @@ def test_links_say_at_level_info_that_the_other_side_is_there_again(
     caplog.set_level(logging.INFO, "hfg")
     mortal({"a": [0.02]})
     hfg.run(two(), clock="virtual", until_s=LONG_S)
-    assert any('group "a" is there again, as life 2' in record.getMessage() for record in caplog.records)
+    assert any('group "a" is back as incarnation 2' in record.getMessage() for record in caplog.records)

@@ -159,7 +159,7 @@ def test_tokens_under_way_are_neither_lost_nor_doubled_nor_out_of_order_when_a_p
         ),
         ([*FAR, c.SetParameter("a.by", 2)], 'concerns group "far" and the main part at once'),
         ([c.Move("b", group="far")], "."),
-        ([c.Disable("mid")], "each token that comes in gives just one on each edge"),
+        ([c.Disable("mid")], "each incoming token yields exactly one on each leaving edge"),
         ([c.Add(f"{HERE}:more", "new", options={"group": "other"})], "."),
         ([c.SetEdge("b.out", "scaler.value", buffer=20)], "leads from one process to another"),
         ([c.Replace("mid", f"{HERE}:Refuses")], "no device"),
@@ -168,7 +168,7 @@ def test_tokens_under_way_are_neither_lost_nor_doubled_nor_out_of_order_when_a_p
         ([c.Enclose(("mid",), "box")], 'subgraph "box" is known to all processes'),
         ([c.Enclose(("a",), "box")], 'subgraph "box" is known to all processes'),
         ([c.Rename("mid", "middle")], '"mid" is known to other processes by its path'),
-        ([c.Copy("mid", "mid2")], '"mid" may be at work in another process with values that are not drawn here'),
+        ([c.Copy("mid", "mid2")], '"mid" may have parameter values in another process that are not drawn here'),
     ],
 )
 def test_what_no_run_in_several_processes_can_follow_is_refused_and_changes_nothing(commands: Any, said: str) -> None:
@@ -235,7 +235,7 @@ def test_an_edit_from_before_the_run_is_not_undone_in_it() -> None:
     graph.edit(c.SetParameter("a.by", 5))
 
     async def body(run: hfg.Run) -> None:
-        with pytest.raises(UsageError, match="edited before the run began"):
+        with pytest.raises(UsageError, match="made before the run started"):
             await run.undo()
 
     with_run(graph, body)

@@ -244,7 +244,7 @@ def test_a_process_that_dies_is_begun_again_and_nothing_is_lost(tmp_path: Path, 
     )
     out, err = running.communicate(timeout=patience(60))
     assert running.returncode == 0, err
-    assert 'the process of group "far" was begun again 1 times' in out
+    assert 'the process of group "far" was restarted 1 times' in out
     assert ("has ended with code 3" if how == "exit" else "was ended by SIGKILL") in err
     nothing_is_left(tmp_path, pids)
 
@@ -318,7 +318,7 @@ def test_a_process_whose_loop_stands_still_is_ended_and_begun_again(tmp_path: Pa
     )
     _, err = running.communicate(timeout=patience(60))
     assert running.returncode == 0, err
-    assert "was ended by SIGKILL, for its event loop has not gone round for" in err
+    assert "was ended by SIGKILL because its event loop has been blocked for" in err
     nothing_is_left(tmp_path, pids)
 
 

@@ -1,8 +1,8 @@
-"""Parts on other hosts: agents are found, asked whether all is there, and asked to begin them (rules L1, L3).
+"""Parts on other hosts: agents are found, asked whether everything is available, and asked to start them.
 
-Parts without a host begin here, as processes that meet in the same realm. When a connection is away nothing follows
-for a while; the links wait. When the agent is gone so are its parts; they begin anew as soon as it is there again, and
-until then everybody waits for them as for a part that is slow. Stands on `realm` and `other`.
+Parts without a host start here, as processes that connect in the same realm. A lost connection has no immediate
+consequences; the links wait. When the agent is gone, so are its parts; they restart as soon as it is back, and until
+then the other parts wait for them as for a slow part (rules L1, L3). Depends on `realm` and `other`.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ _FIRST_LIFE: Final = 1
 _T = TypeVar("_T")
 
 deployed_as: ContextVar[str | None] = ContextVar("hfg.parts.deployed_as", default=None)
-"""What the run of this process is called, if an agent has begun it."""
+"""Name of this process's run, if an agent has started it."""
 
 
 class AgentLauncher:
-    """Begins parts by the agents of their hosts.
+    """Starts parts through the agents of their hosts.
 
     Args:
-      here: begins those without a host, and opens the session.
+      here: starts parts without a host, and opens the session.
     """
 
     shares_memory: bool
@@ -90,7 +90,7 @@ class AgentLauncher:
     # --- before anything begins -------------------------------------------------------------------------------------
 
     async def prepare(self, hosts: Mapping[str, str], modules: Mapping[str, str]) -> None:
-        """See `Launcher`: all agents are asked at once, and all that is wrong is told."""
+        """See `Launcher`: all agents are asked at once, and all problems are reported."""
         abroad = sorted({host for host in hosts.values() if host})
         if not abroad:
             return
@@ -119,9 +119,9 @@ class AgentLauncher:
             return []
         first = there.modules[0]
         return [
-            f'host "{host}" has no module {named(there.modules)}, which "{modules[first]}" needs: install it for '
-            f"the Python of its agent, or put {first.replace('.', '/')}.py into {there.folder} there, where the agent "
-            "was begun"
+            f'host "{host}" has no module {named(there.modules)}, which "{modules[first]}" needs: install '
+            f"it for the Python of its agent, or put {first.replace('.', '/')}.py into {there.folder} there, "
+            "the folder in which the agent was started"
         ]
 
     # --- a part -----------------------------------------------------------------------------------------------------
@@ -140,7 +140,7 @@ class AgentLauncher:
             except NoAnswer:
                 if is_first:
                     raise
-                await asyncio.sleep(_AGAIN_S)  # it has gone just now, which is about to be told
+                await asyncio.sleep(_AGAIN_S)  # it has just gone, which will be reported soon
                 continue
             return _Abroad(self, agent, order, started.process)
 
@@ -168,7 +168,7 @@ class AgentLauncher:
 
 
 class _Abroad:
-    """A part that an agent has begun."""
+    """A part that an agent has started."""
 
     def __init__(self, launcher: AgentLauncher, agent: AgentIs, order: Start, process: int) -> None:
         self.process = process
@@ -178,7 +178,10 @@ class _Abroad:
         self._telling: asyncio.Task[Done] | None = None
 
     async def wait(self) -> str:
-        """See `Launched`: the agent is asked again and again, until it says how it has ended or is itself gone."""
+        """See `Launched`.
+
+        The agent is asked again and again, until it reports how the part has ended or is gone itself.
+        """
         loop = asyncio.get_running_loop()
         silent_since: float | None = None
         while True:
@@ -197,10 +200,11 @@ class _Abroad:
     def begins(self) -> None:
         """See `Launched`."""
         self._telling = asyncio.create_task(self._launcher.ask(self._agent, Begins(*self._which), Done))
-        self._telling.add_done_callback(lambda told: told.cancelled() or told.exception())  # its end is told by `wait`
+        # its end is reported by `wait`
+        self._telling.add_done_callback(lambda told: told.cancelled() or told.exception())
 
     async def end(self) -> None:
-        """See `Launched`; an agent that cannot be reached ends it by itself when it hears nothing of the run."""
+        """See `Launched`. An agent that cannot be reached ends the part by itself when it no longer sees the run."""
         if self._telling is not None:
             self._telling.cancel()
         with contextlib.suppress(TransportError):
@@ -211,8 +215,8 @@ def _versions(there: AgentIs, here: AgentIs) -> str:
     """Say that an agent is of another version; "" if it is not."""
     if there.hfg != here.hfg:
         return (
-            f'host "{there.host}" has hfg {there.hfg} (Python {there.python}), and here is hfg {here.hfg} (Python '
-            f"{here.python}): install the same hfg on all hosts, and begin the agent anew"
+            f'host "{there.host}" has hfg {there.hfg} (Python {there.python}), and here is hfg {here.hfg} '
+            f"(Python {here.python}): install the same hfg on all hosts, and restart the agent"
         )
     if there.python.rpartition(".")[0] != here.python.rpartition(".")[0]:
         _LOGGER.warning('host "%s" has Python %s, and here is Python %s', there.host, there.python, here.python)

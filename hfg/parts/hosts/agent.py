@@ -1,8 +1,8 @@
-"""An agent: begins the parts of runs on its host as it is asked, and ends those whose run is gone (rules L2, X3).
+"""An agent: starts parts of runs on its host on request, and ends those whose run is gone (rules L2, X3).
 
-It decides nothing about a run. Whether a part that has died begins anew is for the main part, which asks for its next
-life; the agent sees to it that the former one is gone by then. It is itself begun and ended by whoever has the host,
-and what it has begun ends with it. Stands on `realm`; how a process is begun is the matter of `hosting`.
+It makes no decisions about a run. The main part decides whether a part that has died is restarted, and requests its
+next incarnation; the agent ensures that the previous one is gone by then. The owner of the host starts and stops the
+agent, and everything that it has started ends with it. Depends on `realm`; `hosting` starts the processes.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ _LOGGER = Log("hfg.agent")
 WAITS_S: Final = 10.0
 """How long a question for the end of a part is kept; it is asked again then."""
 
-_LOOKS_S: Final = 0.5  # for another agent of the same name, before this one says that it is there
+_LOOKS_S: Final = 0.5  # time to look for another agent of the same name before announcing this one
 _MAIN: Final = ""
 _FIRST_LIFE: Final = 1
 
 
 class Hosted(Protocol):
-    """A process that an agent has begun; see `Launched`.
+    """A process that an agent has started; see `Launched`.
 
     Attributes:
       process: its id.
@@ -61,7 +61,7 @@ class Hosted(Protocol):
     process: int
 
     async def wait(self) -> str:
-        """Wait until it is gone; give a sentence about how."""
+        """Wait until it is gone. Return a message about how it ended."""
 
     def begins(self) -> None:
         """From now on it may be expected to answer."""
@@ -71,38 +71,38 @@ class Hosted(Protocol):
 
 
 class Host(Protocol):
-    """What an agent needs of the computer that it is on."""
+    """The agent's interface to its computer."""
 
     async def part(self, order: Start) -> Hosted:
-        """Begin a part.
+        """Start a part.
 
         Raises:
-          HfgError: it cannot be begun.
+          HfgError: it cannot be started.
         """
 
     async def main(self, order: Deploy) -> Hosted:
         """Begin the main part of a run."""
 
     def missing(self, modules: list[str]) -> Missing:
-        """Give those that cannot be imported."""
+        """Return the modules that cannot be imported."""
 
     def read_log(self, run: str, offset: int) -> Chunk:
-        """Give what parts of a run have written."""
+        """Return output of the parts of a run."""
 
     def forget(self, run: str) -> None:
         """No part of a run is here any more: nothing of it is to be left."""
 
     async def close(self) -> None:
-        """Nothing more will be begun."""
+        """Refuse to start anything from now on."""
 
 
 class _Charge:
-    """One life of a part of a run.
+    """One incarnation of a part of a run.
 
     Attributes:
-      life: which.
+      life: its number.
       begun: done when it has a process.
-      gone: how it has ended.
+      gone: done when it has ended; how it ended.
     """
 
     def __init__(self, life: int) -> None:
@@ -124,7 +124,7 @@ class Agent:
     """The agent of a host.
 
     Attributes:
-      me: what it says of itself.
+      me: its description of itself.
     """
 
     def __init__(self, session: Session, host: Host) -> None:
@@ -149,7 +149,7 @@ class Agent:
     # --- being there ------------------------------------------------------------------------------------------------
 
     async def open(self) -> None:
-        """Look who else is there, and be there.
+        """Look for other agents, then announce this one.
 
         Raises:
           TransportError: another agent has the name.
@@ -159,8 +159,8 @@ class Agent:
         if await realm.until(lambda: realm.of(name), _LOOKS_S):
             other = realm.of(name)[0]
             raise TransportError(
-                f'another agent is called "{name}" already (process {other.process} of its host): end that one, or '
-                'give this one another name by host = "..." in its settings'
+                f'another agent is already named "{name}" (process {other.process} of its host): stop that '
+                'one, or give this one another name by host = "..." in its settings'
             )
         self._answers = serve(
             session,
@@ -179,7 +179,7 @@ class Agent:
         self._spawn(self._look_after_runs(realm))
 
     async def _look_after_runs(self, realm: Realm) -> None:
-        """Whenever somebody comes or goes."""
+        """Check the runs whenever a program comes or goes."""
         while True:
             for run in {run for run, part in self._charges if part != _MAIN}:
                 self._look_at(run)
@@ -187,15 +187,15 @@ class Agent:
             if twins and not self._warned:
                 self._warned = True
                 _LOGGER.warning(
-                    'another agent is called "%s" too (process %d of its host), so neither gets parts of runs: end '
-                    "one of the two, or give it another name",
+                    'another agent is also named "%s" (process %d of its host), so neither gets parts of '
+                    "runs: stop one of the two, or give it another name",
                     self.me.host,
                     twins[0].process,
                 )
             await realm.change()
 
     def _look_at(self, run: str) -> None:
-        """Give a run some time, if it is not heard of; and no more thought, if it is."""
+        """Start the timeout of a run that is absent; stop it if the run is present."""
         assert self._realm is not None
         if run_place(run) in self._realm.runs:
             leaving = self._leaving.pop(run, None)
@@ -214,7 +214,7 @@ class Agent:
         await asyncio.gather(*(self._let_go(key, charge) for key, charge in parts))
 
     async def close(self) -> None:
-        """End all that was begun here, and be there no more."""
+        """End everything that was started here, and withdraw the announcement."""
         self._is_closing = True
         if self._announced is not None:
             self._announced.close()
@@ -258,19 +258,19 @@ class Agent:
             if isinstance(order, Start):
                 self._look_at(key[0])
         elif charge.life > life:
-            raise UsageError(f'life {life} of group "{key[1]}" is over: {charge.life} has begun')
+            raise UsageError(f'incarnation {life} of group "{key[1]}" is over: {charge.life} has started')
         return Started((await asyncio.shield(charge.begun)).process)
 
     async def _run(self, charge: _Charge, former: _Charge | None, key: tuple[str, str], order: Start | Deploy) -> None:
-        """One life: behind the end of the former one, until its own."""
+        """Run one incarnation: wait for the end of the previous one, start it, and wait for its end."""
         try:
             if former is not None:
                 await former.end()
             hosted = await (self._host.part(order) if isinstance(order, Start) else self._host.main(order))
         except Exception as error:
-            known = error if isinstance(error, HfgError) else TransportError(f"it cannot be begun: {in_words(error)}")
+            known = error if isinstance(error, HfgError) else TransportError(f"it cannot be started: {in_words(error)}")
             charge.begun.set_exception(known)
-            charge.begun.exception()  # it may be that nobody waits for it any more
+            charge.begun.exception()  # possibly nothing awaits it any more
             charge.gone.set_result(str(known))
             return
         charge.begun.set_result(hosted)

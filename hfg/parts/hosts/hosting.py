@@ -1,6 +1,6 @@
-"""What an agent has of its computer: processes for parts, the modules that these can import, and what they write.
+"""The agent's resources on its computer: processes for parts, the modules that these can import, and their output.
 
-Stands on `launching` and `realm`.
+Depends on `launching` and `realm`.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ _MOST_LOGS: Final = 100
 
 
 class Deployed(msgspec.Struct, frozen=True):
-    """What the process of a deployed run is told on its standard input.
+    """The message on the standard input of a deployed run's process.
 
     Attributes:
-      run: what it is called.
-      arguments: of `hfg run`, the target first.
+      run: its name.
+      arguments: arguments of `hfg run`, the target first.
       settings: the file of the agent; "" for none.
-      folder: in which the target is.
+      folder: the folder of the target.
     """
 
     run: str
@@ -55,10 +55,10 @@ class Computer:
     """This computer, for its agent.
 
     Args:
-      session: of the agent.
-      settings: by which parts open theirs.
-      journal: keeps what processes write.
-      folder: whose modules parts can import, beside what is installed.
+      session: session of the agent.
+      settings: the settings with which parts open theirs.
+      journal: stores the output of processes.
+      folder: folder whose modules parts can import, in addition to installed ones.
     """
 
     def __init__(self, session: Session, settings: dict[str, Any], journal: Journal, folder: Path) -> None:
@@ -153,7 +153,7 @@ def _find(name: str, where: list[str], *, is_top: bool) -> importlib.machinery.M
         try:
             spec = None if find is None else find(name, where if is_usual or not is_top else None)
         except Exception:
-            spec = None  # a finder of somebody's that fails finds nothing
+            spec = None  # a user's finder that fails finds nothing
         if spec is not None:
             return spec  # type: ignore[no-any-return]
     return None
@@ -163,16 +163,16 @@ def _find(name: str, where: list[str], *, is_top: bool) -> importlib.machinery.M
 
 
 def logs_folder() -> Path:
-    """Give where the agents of this user keep what parts have written."""
+    """Return the folder in which the agents of this user store the output of parts."""
     return state_folder() / "logs"
 
 
 class Journal:
-    """Keeps what the parts of runs write on this host, a file for each run, with the time and the group of each line.
+    """Stores the output of parts on this host, one file per run, with the time and the group of each line.
 
     Args:
-      folder: of the files.
-      host: its name, for two agents may share a folder.
+      folder: folder of the files.
+      host: name of the host, because two agents may share a folder.
     """
 
     def __init__(self, folder: Path, host: str) -> None:
@@ -225,10 +225,10 @@ class Journal:
             with file.open("ab") as stream:
                 stream.write(b"".join(head + line + b"\n" for line in lines))
         except OSError:
-            pass  # the disk is full: the run goes on
+            pass  # the disk is full: the run continues
 
     def read(self, run: str, offset: int) -> Chunk:
-        """Give some of it, from a byte on; from the first again, if the file has been begun anew."""
+        """Return part of it, from a byte on; from the start, if the file has been started over."""
         file = self._file(run)
         if not file.exists():
             return Chunk("", 0)

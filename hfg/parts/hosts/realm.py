@@ -1,8 +1,9 @@
-"""Who is in a realm, agents and runs, and what one asks them.
+"""The agents and runs in a realm, and requests to them.
 
-An agent announces `agents/<host>/<incarnation>`, the main part of a run `runs/<run>`, each with what it says of itself.
-They answer questions at names below that: those that begin with "ro" only tell, so viewers may ask them; those with
-"rw" change something. Questions and answers are data of declared types (rule L4). Stands on the contract of transports.
+An agent announces `agents/<host>/<incarnation>`, the main part of a run `runs/<run>`, each with a description of
+itself. They answer questions at names below these: names that start with "ro" only read, so viewers may use them; those
+with "rw" change something. Questions and answers are data of declared types (rule L4). Depends on the contract of
+transports.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ AGENTS: Final = "agents"
 RUNS: Final = "runs"
 
 FINDS_S: Final = 3.0
-"""How long it may take until somebody who is there is found."""
+"""How long it may take to find a program that is present."""
 
 GONE_S: Final = 5.0
 """For how long agents and runs wait for each other when a connection is away; then the other counts as gone."""
@@ -74,17 +75,17 @@ _T = TypeVar("_T")
 
 
 def agent_place(agent: AgentIs) -> str:
-    """Give the name under which an agent is there."""
+    """Return the name under which an agent is announced."""
     return f"{AGENTS}/{agent.host}/{agent.incarnation}"
 
 
 def run_id(run: str) -> str:
-    """Give what a run is called by people, of the name by which its parts know it."""
+    """Return the name of a run for users, from the name by which its parts know it."""
     return run.rpartition("/")[2]
 
 
 def run_place(run: str) -> str:
-    """Give the name under which a run is there."""
+    """Return the name under which a run is announced."""
     return f"{RUNS}/{run_id(run)}"
 
 
@@ -109,7 +110,7 @@ class AgentIs(msgspec.Struct, frozen=True):
 
 
 def myself(host: str) -> AgentIs:
-    """Give what an agent in this process is."""
+    """Return the description of an agent in this process."""
     return AgentIs(
         host, uuid.uuid4().hex[:12], os.getpid(), importlib.metadata.version("hfg"), platform.python_version()
     )
@@ -133,14 +134,14 @@ class RunIs(msgspec.Struct, frozen=True):
 
 
 class PartIs(msgspec.Struct, frozen=True):
-    """A part of a run, as the main one knows it.
+    """The main part's information about a part.
 
     Attributes:
       group: its name; "" is the main part.
       host, process: where it runs.
-      state: "starting", "running", "returning" (it has died, and will begin anew).
-      restarts: how often it has begun anew.
-      up_s: for how long its process is there.
+      state: "starting", "running", "returning" (it has died, and will be restarted).
+      restarts: how often it was restarted.
+      up_s: age of its process in seconds.
     """
 
     group: str
@@ -162,20 +163,20 @@ class Check(msgspec.Struct, frozen=True):
 
 
 class Missing(msgspec.Struct, frozen=True):
-    """Those that are not there, and the folder from which the agent looks for them."""
+    """The missing modules, and the folder in which the agent looks for modules."""
 
     modules: list[str]
     folder: str
 
 
 class Start(msgspec.Struct, frozen=True):
-    """Begin a part -> Started. Asked twice it is begun once.
+    """Start a part -> Started. A repeated request starts it only once.
 
     Attributes:
-      run, part: which.
-      lives: which life this is of it, and which of the main part.
-      argv: what the main program was called with.
-      level: of log records that are of use to it.
+      run, part: names of both.
+      lives: its incarnation, and that of the main part.
+      argv: arguments of the main program.
+      level: level of the log records that it wants.
     """
 
     verb: ClassVar[str] = "rw/start"
@@ -187,13 +188,13 @@ class Start(msgspec.Struct, frozen=True):
 
 
 class Deploy(msgspec.Struct, frozen=True):
-    """Run a graph: begin its main part -> Started.
+    """Run a graph: start its main part -> Started.
 
     Attributes:
-      run: what it is to be called.
+      run: its name.
       target: the graph.
-      arguments: of `hfg run`.
-      folder: where the target is; "": where the agent was begun.
+      arguments: arguments of `hfg run`.
+      folder: folder of the target; "": the folder in which the agent was started.
     """
 
     verb: ClassVar[str] = "rw/deploy"
@@ -204,7 +205,7 @@ class Deploy(msgspec.Struct, frozen=True):
 
 
 class Started(msgspec.Struct, frozen=True):
-    """It has begun, as this process."""
+    """It has started, as this process."""
 
     process: int
 
@@ -224,7 +225,7 @@ class Begins(_OfAPart, frozen=True):
 
 
 class Wait(_OfAPart, frozen=True):
-    """Wait until a part is gone, for a while -> Gone."""
+    """Wait until a part is gone, for a limited time -> Gone."""
 
     verb: ClassVar[str] = "rw/wait"
 
@@ -242,7 +243,7 @@ class End(_OfAPart, frozen=True):
 
 
 class ReadLog(msgspec.Struct, frozen=True):
-    """What the parts of a run have written on this host, from some byte on -> Chunk."""
+    """The output of a run's parts on this host, from some byte on -> Chunk."""
 
     verb: ClassVar[str] = "ro/log"
     run: str
@@ -250,14 +251,14 @@ class ReadLog(msgspec.Struct, frozen=True):
 
 
 class Chunk(msgspec.Struct, frozen=True):
-    """Whole lines, and the byte behind them."""
+    """Whole lines, and the offset after them."""
 
     text: str
     offset: int
 
 
 class Done(msgspec.Struct, frozen=True):
-    """It is done."""
+    """The request was executed."""
 
 
 # --- what a run is asked ---
@@ -276,14 +277,14 @@ class PartsAre(msgspec.Struct, frozen=True):
 
 
 class Look(msgspec.Struct, frozen=True):
-    """What `hfg top` asks through a socket -> Seen."""
+    """The request that `hfg top` sends through a socket -> Seen."""
 
     verb: ClassVar[str] = "ro/look"
     question: bytes
 
 
 class Seen(msgspec.Struct, frozen=True):
-    """What is answered there."""
+    """The answer to it."""
 
     answer: bytes
 
@@ -295,7 +296,7 @@ class Stop(msgspec.Struct, frozen=True):
 
 
 class Restart(msgspec.Struct, frozen=True):
-    """End the process of a part and begin another -> Done, when that is under way."""
+    """End the process of a part and start another -> Done, when that is in progress."""
 
     verb: ClassVar[str] = "rw/restart"
     part: str
@@ -308,8 +309,8 @@ async def ask(session: Session, place: str, request: Any, answer: type[_T], *, t
     """Ask an agent or a run.
 
     Raises:
-      NoAnswer: nobody answers there, or not in time.
-      QueryRefused: with its sentence.
+      NoAnswer: there is no answer, or not in time.
+      QueryRefused: it refuses; with its message.
     """
     told = await session.ask(f"{place}/{request.verb}", msgspec.msgpack.encode(request), timeout_s=timeout_s)
     try:
@@ -335,7 +336,7 @@ def serve(session: Session, place: str, answers: Mapping[Any, Callable[[Any], Aw
 
 
 class Realm:
-    """Who is there, by a session that is open.
+    """The programs in a realm, seen through an open session.
 
     Attributes:
       agents: by place.
@@ -361,18 +362,18 @@ class Realm:
             try:
                 into[one.name] = cleaned(msgspec.msgpack.decode(one.metadata, type=kind))
             except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
-                _LOGGER.warning('"%s" says of itself what this version of hfg cannot read', one.name)
+                _LOGGER.warning('"%s" has an announcement that this version of hfg cannot read', one.name)
         changed, self._changed = self._changed, set()
         for waiting in changed:
             if not waiting.done():
                 waiting.set_result(None)
 
     def of(self, host: str) -> list[AgentIs]:
-        """Give the agents of a name: one, if all is well."""
+        """Return the agents with a name; normally one."""
         return [agent for agent in self.agents.values() if agent.host == host]
 
     async def until(self, true: Callable[[], object], within_s: float | None) -> bool:
-        """Wait until something holds of who is there; gives whether it does."""
+        """Wait until a condition on the present programs holds. Return whether it does."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(within_s):
                 while not true():
@@ -380,7 +381,7 @@ class Realm:
         return bool(true())
 
     async def change(self) -> None:
-        """Wait until somebody comes or goes."""
+        """Wait until a program comes or goes."""
         waiting = asyncio.get_running_loop().create_future()
         self._changed.add(waiting)
         await waiting
@@ -398,8 +399,8 @@ class Realm:
         if len(found) > 1:
             processes = " and ".join(str(agent.process) for agent in found)
             raise TransportError(
-                f'{len(found)} agents are called "{host}" (processes {processes} of their hosts), so it is not known '
-                'which is meant: end one, or give it another name by host = "..." in its settings'
+                f'{len(found)} agents are named "{host}" (processes {processes} of their hosts); stop all but '
+                'one, or rename one with host = "..." in its settings'
             )
         return found[0]
 

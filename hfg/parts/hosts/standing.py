@@ -1,6 +1,6 @@
-"""A run where all of a realm hear of it: what its main part says of itself there, and does when it is asked.
+"""A run that all programs in a realm can find: the announcement of its main part, and its answers to requests.
 
-Stands on `realm`; knows a run by its face.
+Depends on `realm`, and on a run's interface.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ class Standing:
         parts: Callable[[], list[PartIs]],
         restart: Callable[[str], Awaitable[None]],
     ) -> None:
-        """Begin.
+        """Start.
 
         Args:
-          session: of the main part.
-          run: by which name its parts know it.
-          face: what can be done with it.
-          parts: tells of them.
-          restart: ends the process of one, and begins another.
+          session: session of the main part.
+          run: the name by which its parts know it.
+          face: the interface to it.
+          parts: returns information about its parts.
+          restart: ends the process of a part, and starts another.
         """
         self._run = face
         self._parts = parts
@@ -71,7 +71,7 @@ class Standing:
         self._open = [*serve(session, place, answers), session.announce(place, msgspec.msgpack.encode(me))]
 
     def close(self) -> None:
-        """It is over."""
+        """The run is over."""
         for one in reversed(self._open):
             one.close()
 
@@ -90,6 +90,7 @@ class Standing:
         answer = self._door.answer(request.question)
         if isinstance(answer, Asked):
             answer = msgspec.structs.replace(
-                self._door.name, error="what passes a port is told on the host of the main part alone: hfg tap there"
+                self._door.name,
+                error="tokens at a port can be tapped only on the host of the main part: run hfg tap there",
             )
         return Seen(encode(answer))

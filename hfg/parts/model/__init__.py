@@ -1,9 +1,9 @@
-"""What the parts of a run tell each other, and what they decide: nothing here waits, or knows an engine at work.
+"""Messages between the parts of a run, and decisions: nothing here waits, or depends on a running engine.
 
-messages    all that is said beside tokens     failing     errors among it
-agreement   when the whole is quiet            clocks      one clock for all
-lives       whether a dead part begins anew    inheriting  where it goes on that keeps nothing
-ledgers     where is kept what a part has done sieve       which side of an edge tells of it
+messages    all messages except tokens         failing     errors in them
+agreement   when the whole run is quiet        clocks      one clock for all parts
+lives       whether a dead part is restarted   inheriting  where a part without a ledger resumes
+ledgers     stored states of parts             sieve       which side of an edge reports its events
 """
 
 __all__: list[str] = []

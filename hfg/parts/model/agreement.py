@@ -1,16 +1,16 @@
-"""When a graph in parts is quiet, and what follows from that (rules F8, P9, F13, R5).
+"""When a graph in parts is quiet, and the consequences (rules F8, P9, F13, R5).
 
-What a run does when nothing moves any more, it does when nothing moves *anywhere*, and all of it at one moment. So the
-parts say when they rest and what they have sent, received and taken until then; whoever runs the whole compares. Where
-all rest and nothing is on its way, he asks each part whether that still holds (Mattern's second wave), and then lets
-them go through the steps of rule R5 together. A part that has moved meanwhile breaks this off; it will rest again, and
-say so.
+The consequences of quiet take effect when nothing moves *anywhere*, and all at one moment. So the parts report when
+they rest and what they have sent, received and taken until then, and the main part compares the reports. When all rest
+and nothing is in transit, it asks each part whether this still holds (Mattern's second wave), and then leads them
+through the steps of rule R5 together. A part that has moved meanwhile interrupts this; it reports again when it rests.
 
-An edge that may lose signals can have lost some, and then its two ends never say the same. Where all rest and only that
-is between them, the whole looks again after a while; if nothing has come until then, what is missing counts as lost.
+An edge that may lose signals may have lost some; then the reports of its two ends never match. If all rest and only
+such edges differ, they are checked again after a while; if nothing has arrived until then, the missing signals count as
+lost.
 
-A state machine: what it is told are method calls, what it wants done is what `ask` and `wait` are called with, and the
-answers may come at any time and in any order. Knows no network, no clock and no engine.
+A state machine: its inputs are method calls, its outputs are calls of `ask` and `wait`, and the answers may come at any
+time and in any order. Does not depend on a network, a clock or an engine.
 """
 
 from __future__ import annotations
@@ -27,14 +27,15 @@ Step: TypeAlias = Literal[
 ]
 
 _STEPS: Final[tuple[Step, ...]] = ("rests", "fullest", "held", "give_up", "complete", "end", "stuck")
-"""What is asked of all parts, in this order (SEMANTICS "quiet"); the others are asked for by the answers."""
+"""The questions to all parts, in this order (SEMANTICS "quiet"); the answers determine the other questions."""
 
 
 Counted: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**62)]
 
 Account: TypeAlias = tuple[Counted, Counted, str, bool]
-"""What one side knows of an edge: how many tokens have left or come, how many of them were taken, whether the consumer
-takes, drains or is sent none, and whether the producer is enabled."""
+"""One side's state of an edge: how many tokens have left or arrived, how many of them were taken, whether the consumer
+takes, drains or gets none, and whether the producer is enabled.
+"""
 
 
 _ANSWERS: Final[dict[Step, Any]] = {
@@ -45,11 +46,11 @@ _ANSWERS: Final[dict[Step, Any]] = {
     "fullest": tuple[float, float, str] | None,
     "stuck": list[str],
 }
-"""What is answered to a question; to the others, whether it is so."""
+"""Types of answers to some questions; the others are answered with yes or no."""
 
 
 _QUESTIONS: Final[dict[Step, Any]] = {"lose": dict[str, Counted], "grow": str, "finish": list[str]}
-"""What a question of these steps says."""
+"""Types of the contents of these questions."""
 
 
 class Rest(msgspec.Struct, frozen=True):
@@ -58,8 +59,8 @@ class Rest(msgspec.Struct, frozen=True):
     Attributes:
       part: its name.
       number: how often it has rested; from 1.
-      leaving: what it knows of edges that leave it, by label.
-      coming: what it knows of edges that come in. Where nothing is on its way the two sides know the same.
+      leaving: its state of leaving edges, by label.
+      coming: its state of incoming edges. If nothing is in transit, the two sides agree.
     """
 
     part: str
@@ -69,11 +70,11 @@ class Rest(msgspec.Struct, frozen=True):
 
 
 class Question(msgspec.Struct, frozen=True):
-    """What a part is to do or say, if it still rests.
+    """A question or instruction to a part, valid if it still rests.
 
     Attributes:
       step: see `Step`.
-      rest: the number of the rest that is meant.
+      rest: the number of the rest that it refers to.
       value: for `lose` how many have left, by label of the edge; for `grow` the label of the edge; for `finish` the
         reasons why the run has stalled.
     """
@@ -92,15 +93,15 @@ class Question(msgspec.Struct, frozen=True):
 
 
 class Answer(msgspec.Struct, frozen=True):
-    """What a part has answered.
+    """The answer of a part.
 
     Attributes:
       part: its name.
-      step: of the question.
-      rest: of the question.
-      moved: the part does not rest any more, or not since then; nothing was done.
-      value: `fullest`: (capacity, number, label) of a queue, or None. `held`: whether somebody outside may still bring
-        or take something. `give_up`, `complete`, `end`: whether that made something move. `stuck`: reasons.
+      step: step of the question.
+      rest: rest of the question.
+      moved: the part does not rest any more, or has moved in between; nothing was done.
+      value: `fullest`: (capacity, number, label) of a queue, or None. `held`: whether tokens may still be brought in or
+        taken from outside. `give_up`, `complete`, `end`: whether this made something move. `stuck`: reasons.
     """
 
     part: str
@@ -121,13 +122,13 @@ class Agreement:
         lossy: Iterable[str] = (),
         wait: Callable[[], None] = lambda: None,
     ) -> None:
-        """Begin with parts that have not rested yet.
+        """Start with parts that have not rested yet.
 
         Args:
           parts: their names.
-          ask: brings a question to a part; its answer is to be given to `hear`.
-          lossy: the edges that may lose tokens, by label.
-          wait: has `look_again` called in a while.
+          ask: sends a question to a part; pass its answer to `hear`.
+          lossy: labels of the edges that may lose tokens.
+          wait: schedules a call of `look_again`.
         """
         self._lossy = frozenset(lossy)
         self._wait = wait
@@ -139,7 +140,7 @@ class Agreement:
         self._answers: dict[str, Any] = {}
 
     def rest(self, rest: Rest) -> None:
-        """A part rests; what it said before holds no more."""
+        """A part rests; its previous report is obsolete."""
         self._rests[rest.part] = rest
         self._step = None
         self._look()
@@ -157,7 +158,7 @@ class Agreement:
             self._begin("missing")
 
     def leave(self, part: str) -> None:
-        """A part is gone, or begins anew: what it said does not count."""
+        """A part is gone, or is restarted: its report does not count."""
         self._rests[part] = None
         self._step = None
 
@@ -212,14 +213,14 @@ class Agreement:
             self._step = None
             return
         elif step != "rests" and any(answers.values()):
-            self._step = None  # it goes on, or is held open by somebody outside
+            self._step = None  # it continues, or is held open from outside
             return
         self._begin(_STEPS[_STEPS.index(step) + 1])
 
     def _missing(self) -> dict[str, tuple[int, int]] | None:
-        """How many have left and come on edges where some are missing, by label.
+        """Return how many tokens have left and arrived, for edges with missing tokens, by label.
 
-        None: some parts do not rest, or something else is between them, be it only the word that something was taken.
+        None: some parts do not rest, or something else is in transit, even if it is only an acknowledgement.
         """
         leaving: dict[str, Account] = {}
         coming: dict[str, Account] = {}

@@ -1,9 +1,9 @@
 """One clock for all parts of a run: exact on one machine, estimated with a bound between machines (rule T5).
 
-The run's clock is that of the main part: the monotonic clock of its machine, and how far Unix time was ahead of it when
-the run began. Another process of that machine reads the same monotonic clock. Another machine has one of its own, so
-its part asks what time it is, several times: an answer that took a round trip of r is wrong by r / 2 at most, whatever
-share of it either way took, and the quickest answer is believed. Decides, never waits. Stands on nothing.
+The run's clock is that of the main part: the monotonic clock of its machine, plus the offset of Unix time at the start
+of the run. Another process of that machine reads the same monotonic clock. Another machine has a clock of its own, so
+its part asks for the time, several times: the error of an answer with a round trip of r is at most r / 2, however r is
+divided between both directions, and the fastest answer counts. Decides, never waits. No dependencies.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def machine() -> str:
     """Name what has one monotonic clock: a machine since it was started."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text("ascii").strip()
-    except OSError:  # no Linux: processes that were begun here share it, and nobody else does
+    except OSError:  # not Linux: only processes started here share it
         return f"{platform.node()} {uuid.getnode()}"
 
 
@@ -38,9 +38,9 @@ class RunClock(msgspec.Struct, frozen=True):
     """The clock of a run.
 
     Attributes:
-      machine: whose monotonic clock it goes by.
-      ahead_s: how far it is ahead of that.
-      began_s: when the run began, on it.
+      machine: the machine whose monotonic clock it uses.
+      ahead_s: its offset from that clock.
+      began_s: start of the run, on this clock.
     """
 
     machine: str
@@ -68,12 +68,12 @@ class Offset:
         self._answers: deque[_Answer] = deque(maxlen=_KEPT)
 
     def hear(self, asked: float, told: float, now: float) -> None:
-        """An answer has come.
+        """Process an answer.
 
         Args:
-          asked: when it was asked for, on the clock here.
-          told: what time it was there when it was answered.
-          now: on the clock here.
+          asked: time of the question, on the local clock.
+          told: the answer, on the remote clock.
+          now: arrival of the answer, on the local clock.
         """
         within = max(0.0, now - asked) / 2
         self.heard += 1
@@ -85,7 +85,7 @@ class Offset:
         return min((self._bound(answer, now) for answer in self._answers), default=float("inf"))
 
     def error_of(self, used_s: float, now: float) -> float:
-        """By how much somebody may be wrong who goes by an earlier estimate."""
+        """Return the maximum error of code that still uses an earlier estimate."""
         return abs(self.offset_s - used_s) + self.within_s(now)
 
     @staticmethod

@@ -1,10 +1,10 @@
-"""What the death of a process costs, for each connected part of synchronous edges in its group (rule L2).
+"""The cost of a process's death, for each connected component of synchronous edges in its group (rule L2).
 
-All nodes of such a component fire equally often, for each firing takes one token from every edge and puts one on every
-edge. So its n-th tokens belong together wherever they are, and a next life of it can go on behind a loss without
-pairing what does not belong together: with the number behind the last of which anybody outside knows. What one
-component has done says nothing of another, be they in the same process. Decides, never waits. Stands on graphs that
-are cut.
+All nodes of a component fire equally often because each firing takes one token from every edge and puts one on every
+edge. So its n-th tokens belong together wherever they are. The next incarnation can therefore resume after a loss
+without pairing tokens that do not belong together: with the number after the last one that is known outside. The state
+of one component says nothing about another, even in the same process. Decides, never waits. Depends on graphs that are
+cut.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from hfg.graph.flat.order import strongly_connected
 __all__ = ["Component", "Cost", "components", "is_numbered", "is_synchronous"]
 
 Cost: TypeAlias = Literal["nothing", "taken", "unknown"]
-"""What a death costs: nothing; what was taken and had not been passed on; so much, but nobody can know how much."""
+"""Cost of a death: nothing; the tokens that were taken and not passed on; or an unknown number of tokens."""
 
 _SWITCHES: Final = ("enable", "disable")
 
@@ -28,18 +28,18 @@ _Key: TypeAlias = tuple[str, int]  # a node: its part, and its number there
 
 
 class Component(msgspec.Struct, frozen=True):
-    """A connected part of synchronous edges in a group.
+    """A connected component of synchronous edges in a group.
 
     Attributes:
       part: the group.
       nodes: their paths.
-      coming: the edges from other parts, by label, of whose tokens each of its firings takes one.
-      leaving: the synchronous edges to other parts, by label.
-      answers: each token that comes in gives exactly one on each edge that leaves, and nothing else.
-      why: why it does not, in words; "" if it does.
-      uncertain: why nobody can know how many tokens a death costs; "" if that can be known.
-      joined: the node that would pair what does not belong together, if that is not known; "" if there is none.
-      source: a source in it, which begins again from its start; "" if there is none.
+      coming: labels of the edges from other parts; each firing takes one token from each.
+      leaving: labels of the synchronous edges to other parts.
+      answers: each incoming token yields exactly one token on each leaving edge, and nothing else.
+      why: why this does not hold, in words; "" if it does.
+      uncertain: why the number of tokens that a death costs is unknown; "" if it is known.
+      joined: the node that would pair tokens that do not belong together if the number is unknown; "" if there is none.
+      source: a source in it, which starts over; "" if there is none.
     """
 
     part: str
@@ -53,47 +53,47 @@ class Component(msgspec.Struct, frozen=True):
     source: str
 
     def in_words(self) -> tuple[str, str, str]:
-        """What a death costs, why, and what would avoid that."""
+        """Return the cost of a death, the reason, and a remedy."""
         if self.cost == "nothing":
-            return "a death costs nothing", "each token that comes in gives exactly one on each edge that leaves", ""
+            return "a death costs nothing", "each incoming token yields exactly one token on each leaving edge", ""
         what = "a death costs what was taken and not passed on; each token of it is counted, and joins stay aligned"
         if self.source:
-            what += f', and source "{self.source}" begins again from its start'
+            what += f', and source "{self.source}" starts over'
         if self.cost == "unknown":
-            what = "a death costs tokens, and nobody can know how many"
+            what = "a death costs an unknown number of tokens"
             if self.joined:
-                what += f': it ends the run, for "{self.joined}" would pair what does not belong together'
-        remedy = "give the group ledger=True, so that nothing is lost"
+                what += f': it ends the run because "{self.joined}" would pair tokens that do not belong together'
+        remedy = "give the group ledger=True so that nothing is lost"
         if self.joined:
-            remedy += ", or may_misalign=True, so that the run goes on"
+            remedy += ", or may_misalign=True so that the run continues"
         return what, self.uncertain or self.why, remedy
 
     @property
     def cost(self) -> Cost:
-        """What a death costs without a ledger."""
+        """The cost of a death without a ledger."""
         if self.answers:
             return "nothing"
         return "unknown" if self.uncertain else "taken"
 
 
 def is_synchronous(edge: CutEdge) -> bool:
-    """Whether it is an edge from an output."""
+    """Return whether it is an edge from an output."""
     return edge.guarantee == "exact" and not edge.edge.is_event_edge
 
 
 def is_numbered(edge: CutEdge) -> bool:
-    """Whether each firing of its consumer takes one token from it, so that its n-th belongs to the n-th firing."""
+    """Return whether each firing of its consumer takes one token from it: the n-th token for the n-th firing."""
     kind = edge.edge.target.kind
     return edge.guarantee == "exact" and (kind == "input" or (kind == "parameter" and not edge.edge.is_event_edge))
 
 
 def components(cutting: Cutting, kept: Collection[str] = ()) -> dict[str, tuple[Component, ...]]:
-    """Give the components of each part but the main one; all parts of a run come to the same answer.
+    """Return the components of each part except the main one. All parts of a run compute the same result.
 
     Args:
       cutting: of the graph.
-      kept: the parts with ledgers (see `keeping`), for what a death costs beside them; that they are there does not
-        matter to what they are themselves.
+      kept: the parts with ledgers (see `keeping`), which affect the cost of deaths of other parts; their own components
+        do not depend on it.
     """
     whole = _Whole(cutting, kept)
     return {
@@ -114,7 +114,7 @@ def _connected(flat: FlatGraph) -> list[list[int]]:
 
 
 def _is_joined_by(edge: FlatEdge) -> bool:
-    """Whether its two ends fire equally often."""
+    """Return whether its two ends fire equally often."""
     return edge.source.kind == "output" and edge.target.kind in ("input", "parameter")
 
 
@@ -134,17 +134,17 @@ def _component(whole: _Whole, part: str, flat: FlatGraph, numbers: list[int]) ->
 
 
 def _why_no_answers(flat: FlatGraph, nodes: list[FlatNode], touching: list[FlatEdge]) -> str:
-    """Why a token that comes in need not give exactly one on each edge that leaves; "" if it does."""
+    """Return why an incoming token need not yield exactly one on each leaving edge; "" if it does."""
     steered = _steered(flat)
     fed = {edge.target.node for edge in touching}
     sending = {edge.source.node for edge in touching}
     for edge in touching:
         if edge.source.kind != "output" or edge.target.kind != "input":
-            return f'"{edge.label}" is no edge from an output into an input'
+            return f'"{edge.label}" is not an edge from an output to an input'
         if edge.active:
             return f'"{edge.label}" carries activity'
         if edge.source.node < 0 and edge.source.node != LINK:
-            return f'"{edge.label}" does not begin at a node'
+            return f'"{edge.label}" does not start at a node'
     for node in nodes:
         if node.index in steered:
             return f'"{node.path}" has a gate, or is steered by a subgraph around it'
@@ -160,18 +160,18 @@ def _why_no_answers(flat: FlatGraph, nodes: list[FlatNode], touching: list[FlatE
 def _why_not_each(node: FlatNode, *, sends: bool) -> str:
     options = node.options
     if sends and node.node._hook("end") is not None:
-        return "may have a last word in end(), which answers nothing"
+        return "may send in end(), which does not answer a token"
     if not options.enabled:
         return "is disabled at the start"
     if options.concurrency != 1:
-        return "has several firings under way at once"
+        return "has several firings in progress at once"
     if options.on_error != "stop":
         return f'has on_error="{options.on_error}"'
     return "has active_for_s" if options.active_for_s else ""
 
 
 def _steered(flat: FlatGraph) -> set[int]:
-    """The nodes whose work hangs on gates, and those inside of subgraphs that are meant themselves."""
+    """Return the nodes that depend on gates, and those inside subgraphs that have automatic ports or gates."""
     ends = [end for gate in flat.gates for end in (gate.target, gate.by)]
     ends += [end.node for edge in flat.edges for end in (edge.source, edge.target) if end.node not in (LINK, ROOT)]
     found = {end for gate in flat.gates for end in (gate.target, gate.by) if end >= 0}
@@ -196,7 +196,10 @@ def _why_uncertain(whole: _Whole, flat: FlatGraph, nodes: list[FlatNode], touchi
     for edge in touching:
         if edge.target.node == LINK and whole.by_label[edge.label].target in whole.kept and not edge.is_event_edge:
             keeps = whole.by_label[edge.label].target
-            return f'"{edge.label}" leads into group "{keeps}", whose ledger knows what has come and not what is lost'
+            return (
+                f'"{edge.label}" leads to group "{keeps}", whose ledger knows the tokens that have arrived but '
+                "not the lost ones"
+            )
     if whole.comes_back(part, {node.index for node in nodes}):
         return "what it sends comes back to it by way of another process"
     return ""
@@ -250,7 +253,7 @@ class _Whole:
             self.data.append((source, target, label))
 
     def key_of(self, part: str, edge: FlatEdge, *, source: bool) -> _Key | None:
-        """The node at one end of an edge, be it in another part; None if there is no node."""
+        """Return the key of the node at one end of an edge, even in another part; None if there is no node."""
         end = edge.source if source else edge.target
         if end.node == LINK:
             return self._ends.get((edge.label, source))
@@ -261,7 +264,7 @@ class _Whole:
         return self.cutting.parts[key[0]].nodes[key[1]].path
 
     def comes_back(self, part: str, inside: set[int]) -> bool:
-        """Whether what leaves a component comes back to it, by way of another process."""
+        """Return whether tokens that leave a component come back to it through another process."""
         after: dict[_Key, list[_Key]] = {}
         for source, target, _ in self.data:
             after.setdefault(source, []).append(target)
@@ -278,7 +281,7 @@ class _Whole:
         return False
 
     def joined(self, part: str, inside: set[int], leaving: Iterable[str]) -> str:
-        """A node outside that pairs what comes of one edge of the component with anything else; "" if none does."""
+        """Return a node outside that pairs the component's tokens with others; "" if there is none."""
         own = {(part, number) for number in inside}
         for node in sorted(self._own_joins(own)):
             return self.path(node)
@@ -313,13 +316,13 @@ class _Whole:
 
 
 class _Sets:
-    """Which nodes hang together."""
+    """Sets of connected nodes."""
 
     def __init__(self) -> None:
         self._above: dict[Any, Any] = {}
 
     def of(self, one: Any) -> Any:
-        """Who stands for all that hangs together with it."""
+        """Return the representative of all nodes that are connected with one."""
         path = []
         while (above := self._above.get(one, one)) != one:
             path.append(one)

@@ -1,6 +1,6 @@
-"""What the death of each process of a graph costs, for whoever checks it before it runs (rule L2).
+"""The cost of the death of each process of a graph, for checks before it runs (rule L2).
 
-Stands on `components`.
+Depends on `components`.
 """
 
 from __future__ import annotations
@@ -53,13 +53,13 @@ def uncounted(cutting: Cutting, part: str, kept: Collection[str]) -> tuple[str, 
     paths = {path for one in costly for path in one.nodes}
     nodes = {node.index: node for node in flat.nodes if node.path in paths}
     sources = [one.source for one in costly if one.source]
-    again = [f'source "{source}" began again from its start: what it had sent is sent once more' for source in sources]
+    again = [f'source "{source}" started over, so its values are sent once more' for source in sources]
     return (*_lost_work(nodes), *_lost_tokens(flat, nodes), *_repeated_starts(flat), *again)
 
 
 def _lost_work(nodes: Mapping[int, FlatNode]) -> Iterator[str]:
     if work := sum(node.options.concurrency for node in nodes.values()):
-        yield f"up to {_many(work, 'firing or slot call', 'firings and slot calls')} under way were lost with it"
+        yield f"up to {_many(work, 'firing or slot call', 'firings and slot calls')} in progress were lost with it"
 
 
 def _lost_tokens(flat: FlatGraph, nodes: Collection[int]) -> Iterator[str]:

@@ -1,7 +1,7 @@
-"""Errors that are told from one part to another: what is left of them is a class of hfg's and sentences (rules L4, X1).
+"""Errors that are sent from one part to another: a class of hfg and messages remain of them (rules L4, X1).
 
-What the firing had taken that failed goes with the event `failed` by the declared types of the inputs, and a value that
-cannot go is left out and named, for an error on the way of an error helps nobody.
+The tokens that a failed firing had taken are sent with the event `failed`, by the declared types of the inputs. A value
+that cannot be sent is left out and named, because a second error would only hide the first.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ def as_failed(error: BaseException | None) -> Failed | None:
 
 
 def as_error(failed: Failed, where: str) -> HfgError:
-    """Make an error of what was told.
+    """Make an error from what was received.
 
     Args:
-      failed: as it came.
-      where: in which process, for a note at the error.
+      failed: the received data.
+      where: the process, for a note on the error.
     """
     failed = cleaned(failed)
     kind = getattr(errors, failed.kind, RunError)
@@ -62,26 +62,26 @@ def as_error(failed: Failed, where: str) -> HfgError:
 
 
 def codec_of(port: Port, hint: Any, what: str) -> TokenCodec[Any]:
-    """Give what encodes the values that leave by a port, failures among them.
+    """Return the codec for the values of a port, including failures.
 
     Args:
-      port: by which they leave.
+      port: the port that sends them.
       hint: their type.
-      what: what messages call a value.
+      what: the name of a value in messages.
 
     Raises:
-      EncodingError: values of this type cannot cross.
+      EncodingError: values of this type cannot be sent to another process.
     """
     return _FailureCodec(port, what) if hint is Failure else TokenCodec(hint, what=what)
 
 
 class _Told(msgspec.Struct, frozen=True):
-    """A `Failure` on its way.
+    """A `Failure` in transit.
 
     Attributes:
       failed: the error.
-      taken: metadata and value of what the firing had taken, by name of the input.
-      left_out: why a value is not among these, by name of the input.
+      taken: metadata and values of the tokens that the firing had taken, by name of the input.
+      left_out: why a value is missing there, by name of the input.
     """
 
     failed: Failed

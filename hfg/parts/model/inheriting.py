@@ -1,10 +1,10 @@
-"""Parts of which nothing is lost when they die, and where a new life of a part goes on (rule L2, docs/links.md).
+"""Parts that lose nothing when they die, and where a new incarnation of a part resumes (rule L2, docs/links.md).
 
-A component (see `components`) in which each token gives exactly one on each edge that leaves it needs no ledger: what
-it sends inherits the positions of what it was sent, and a token counts as done when all that came of it is done. A new
-life of it is sent what was not done, sends what comes of that once more, and whoever has it already knows it by its
-number. Any other component goes on behind the last number that anybody outside knows of. Decides, never waits. Stands
-on graphs that are cut.
+A component (see `components`) in which each token yields exactly one on each leaving edge needs no ledger: its tokens
+inherit the positions of the incoming ones, and a token counts as processed when all its consequences are. A new
+incarnation is sent the tokens that were not processed and sends their consequences once more; consumers that already
+have them recognise them by their numbers. Any other component resumes after the last number that is known outside.
+Decides, never waits. Depends on graphs that are cut.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ Where: TypeAlias = tuple[int, int]
 """The position of a token: stream and number. Over an edge from an output numbers grow by one through all lives."""
 
 UNKNOWN: Final[Where] = (-1, 0)
-"""Said of a position by a life of a part that was not told yet where it goes on."""
+"""Position reported by an incarnation of a part that does not know yet where it resumes."""
 
 Arrived: TypeAlias = tuple[tuple[Any, int, float], Where]
 """A token that has come (value, modifier and stamp), and its position."""
 
 
 def inheriting(cutting: Cutting) -> frozenset[str]:
-    """Give the parts with components whose tokens inherit positions; all parts of a run come to the same answer.
+    """Return the parts with components whose tokens inherit positions. All parts of a run compute the same result.
 
-    A delay holds tokens back for good, so it would hold up who waits until they are done: with one in the graph none
-    does; nor does one beside a ledger (see `keeping`).
+    A delay keeps tokens back permanently, so it would block anything that waits until they are processed. With a delay
+    in the graph, no part inherits positions; nor does a part with a neighbour that has a ledger (see `keeping`).
     """
     if keeping(cutting):
         return frozenset()
@@ -51,7 +51,7 @@ def inheriting(cutting: Cutting) -> frozenset[str]:
 
 
 def inherited(cutting: Cutting) -> frozenset[str]:
-    """Give the edges between parts, by label, whose tokens inherit their positions."""
+    """Return the labels of the edges between parts whose tokens inherit their positions."""
     return frozenset(
         label
         for name, found in _answering(cutting).items()
@@ -62,17 +62,18 @@ def inherited(cutting: Cutting) -> frozenset[str]:
 
 
 def remembered(cutting: Cutting) -> frozenset[str]:
-    """Give the edges between parts, by label, whose producer remembers what it has sent, in another life too."""
+    """Return the labels of the edges between parts whose producer remembers the tokens of its previous incarnations."""
     keeps = keeping(cutting)
     return inherited(cutting) | {edge.label for edge in cutting.edges if edge.source in keeps}
 
 
 def keeping(cutting: Cutting) -> dict[str, bool | str]:
-    """Give the parts that have a ledger, and where: as in `GroupSpec`; all parts of a run come to the same answer.
+    """Return the parts that have a ledger, and where: as in `GroupSpec`; all parts of a run come to the same answer.
 
-    Beside one that was asked for, those that would inherit positions have one too: a neighbour that goes on from what
-    it has kept has not got all that it was sent, and what is inherited alone would not tell. So they do where two of
-    them feed each other: a token would be done when it is done at the other, and there when it is done here.
+    Next to a part with a requested ledger, parts that would inherit positions get a ledger, too: a neighbour that
+    resumes from its ledger lacks some tokens that it was sent, and inherited positions alone would not show this. The
+    same holds if two such parts feed each other: a token would be processed here when it is processed there, and there
+    when it is processed here.
     """
     asked_for, answering = _asked_for(cutting), _answering(cutting)
     if not asked_for and not _feed_each_other(cutting, answering):
@@ -88,7 +89,7 @@ def _answering(cutting: Cutting) -> dict[str, tuple[Component, ...]]:
 
 
 def _feed_each_other(cutting: Cutting, answering: Mapping[str, tuple[Component, ...]]) -> bool:
-    """Whether what leaves one of these components comes back to it, by way of whatever nodes."""
+    """Return whether tokens that leave one of these components come back to it, through any nodes."""
     home = {
         path: (name, number)
         for name, found in answering.items()
@@ -125,10 +126,10 @@ def _asked_for(cutting: Cutting) -> dict[str, bool | str]:
 
 
 class Inheritance:
-    """The positions of what a part will send: the n-th of them is that of the n-th token that came.
+    """The positions of the tokens that a part will send: the n-th is that of the n-th incoming token.
 
-    That is the same on all edges, unless a source has begun anew; so the first edge says it, and when that has brought
-    END the next one, which may go on longer.
+    They are the same on all edges unless a source has started over. So the first edge determines them, and after its
+    END the next one, which may continue longer.
     """
 
     def __init__(self, labels: Iterable[str]) -> None:
@@ -144,7 +145,10 @@ class Inheritance:
         self._given = 0
 
     def arrive(self, label: str, came: list[Where], *, ended: bool) -> list[Where]:
-        """Take the positions of tokens that came on an edge, perhaps END behind them; gives what is known by that."""
+        """Record the positions of tokens that arrived on an edge, perhaps followed by END.
+
+        Return the positions known by now.
+        """
         ahead = self._ahead[label]
         ahead.extend(enumerate(came, self._came[label]))
         self._came[label] += len(came)
@@ -166,23 +170,23 @@ class Inheritance:
 
 
 class Alignment:
-    """Where a component goes on in a new life of its part: behind the last number of which anybody outside knows.
+    """Where a component resumes in a new incarnation of its part: after the last number that is known outside.
 
-    What belongs together has the same number on all its edges. What was done may be known to one producer and not yet
-    to another, and consumers may have got what no producer knows to be done; whatever is older came of former lives, or
-    is lost with them.
+    Tokens that belong together have the same number on all edges. One producer may know that a token was processed and
+    another one not yet, and consumers may have tokens that no producer knows to be processed. All older tokens are from
+    previous incarnations, or lost with them.
 
     Attributes:
-      start: the number with which it goes on on all edges; None: not all have told yet.
+      start: the number with which it resumes on all edges; None: some reports are missing.
     """
 
     def __init__(self, coming: Mapping[str, int], leaving: Iterable[str] = (), *, start: int | None = None) -> None:
-        """Begin knowing nothing.
+        """Start without information.
 
         Args:
           coming: the edges that come in, by label, and how many initial values each has.
-          leaving: those that leave and of which consumers tell what has come.
-          start: where it goes on, if that is known.
+          leaving: the leaving edges whose consumers report what has arrived.
+          start: where it resumes, if known.
         """
         self.start = start
         self._delays = dict(coming)
@@ -192,30 +196,30 @@ class Alignment:
         self._look()
 
     def done(self, label: str, number: int) -> None:
-        """The producer of an edge knows that all up to that number is done."""
+        """The producer of an edge knows that everything up to `number` is processed."""
         if self._done.get(label, 0) is None:
             self._done[label] = number
             self._look()
 
     def came(self, label: str, number: int) -> None:
-        """The consumer of an edge has got all up to that number, as far as it knows."""
+        """The consumer of an edge has received everything up to `number`, as far as it knows."""
         if self._came.get(label, 0) is None:
             self._came[label] = number
             self._look()
 
     def hold(self, label: str, tokens: list[Arrived]) -> None:
-        """These have come before all have told."""
+        """Keep tokens that arrive before all reports."""
         self._held[label] += tokens
         if tokens:
             self.done(label, tokens[0][1][1] - 1)
 
     def let_go(self) -> dict[str, list[Arrived]]:
-        """Give what was held, now that it is known where it goes on."""
+        """Return the kept tokens, now that the start is known."""
         held, self._held = self._held, {label: [] for label in self._held}
         return held
 
     def passed_over(self, label: str) -> int:
-        """How many tokens of an edge that comes in are behind the start, and were not known to be done."""
+        """Return how many tokens of an incoming edge are before the start and were not known to be processed."""
         return 0 if self.start is None else max(self.start - 1 - (self._done[label] or 0), 0)
 
     def _look(self) -> None:

@@ -15,11 +15,11 @@ __all__ = ["Entry", "Ledger", "LedgerFile", "ledger_of"]
 
 
 class Entry(NamedTuple):
-    """What is kept of a part.
+    """The stored data of a part.
 
     Attributes:
-      life: the highest number of a life that was given in its run.
-      data: as the part has said it.
+      life: the highest incarnation number in its run.
+      data: as the part has sent it.
     """
 
     life: int
@@ -27,10 +27,10 @@ class Entry(NamedTuple):
 
 
 class Ledger:
-    """Keeps an entry as long as the run goes on.
+    """Stores an entry for the duration of the run.
 
     Attributes:
-      entry: what was written last.
+      entry: the entry that was written last.
       is_slow: writing may take some milliseconds.
     """
 
@@ -48,7 +48,7 @@ class Ledger:
         self.entry = entry
 
     def clear(self) -> None:
-        """The run has ended well: the next one begins anew."""
+        """The run has ended well: the next one starts from scratch."""
         self.entry = None
 
     def close(self) -> None:
@@ -64,11 +64,11 @@ class LedgerFile(Ledger):
         """Open the file, and read what is there.
 
         Args:
-          path: of the file; it is made if there is none.
-          part: of which part the entry is.
+          path: path of the file; it is created if it does not exist.
+          part: the part that the entry belongs to.
 
         Raises:
-          RunError: it is no ledger, is broken, or another run has it open.
+          RunError: it is not a ledger, is broken, or is open in another run.
         """
         super().__init__()
         self.path = path
@@ -89,8 +89,8 @@ class LedgerFile(Ledger):
             life, checksum, data = found
             if zlib.crc32(data) != checksum:
                 raise RunError(
-                    f'ledger "{path}" of group "{part}" is broken: the checksum of what it keeps is another; restore '
-                    "it from a copy, or remove it to begin anew"
+                    f'ledger "{path}" of group "{part}" is broken: its checksum does not match; restore it '
+                    "from a copy, or remove it to start over"
                 )
             self.entry = Entry(life, data)
 
@@ -117,8 +117,8 @@ class LedgerFile(Ledger):
 
     def _refuse(self, error: sqlite3.Error) -> RunError:
         return RunError(
-            f'ledger "{self.path}" of group "{self._part}" cannot be used: {error}; give a path that can be written, '
-            "of a file that is a ledger or not there, and that no other run or group has open"
+            f'ledger "{self.path}" of group "{self._part}" cannot be used: {error}; use a writable path of a '
+            "ledger, or of a file that does not exist, that no other run or group has open"
         )
 
 

@@ -1,6 +1,6 @@
-"""Whether a part that has died begins anew, and when: with pauses that grow, and not without end (rule L2).
+"""Whether and when a part that has died is restarted: with growing pauses, and not endlessly (rule L2).
 
-Decides, never waits: what time it is comes with each call. Stands on nothing.
+Decides, never waits: the time is an argument of each call. No dependencies.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["LIMIT", "WITHIN_S", "Deaths"]
 
 LIMIT: Final = 5
-"""How often a part may die within a minute and begin anew."""
+"""How often a part may die within a minute and be restarted."""
 
 WITHIN_S: Final = 60.0
 _FIRST_PAUSE_S: Final = 0.1
@@ -38,7 +38,7 @@ class Deaths:
         self._recent: deque[float] = deque()
 
     def died(self, now: float) -> float | None:
-        """It has died; gives for how many seconds to wait until it begins anew, or None: it does not any more."""
+        """Record a death. Return the pause before the restart in seconds, or None: it is not restarted."""
         self.count += 1
         recent = self._recent
         while recent and now - recent[0] > self._within_s:

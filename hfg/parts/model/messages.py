@@ -1,4 +1,4 @@
-"""What the parts of a run tell each other beside tokens, in order and without loss; and how.
+"""The messages between parts of a run other than tokens, in order and without loss, and their encoding.
 
     Whole -> part     Open, TellTime, Begin, Question, Reborn, Kept, Finish, Call, Close
     Part  -> whole    AskTime, Opened, Rest, Answer, Keep, Ended, Result, Seen, Logged, Closed
@@ -88,20 +88,20 @@ Label: TypeAlias = Annotated[str, msgspec.Meta(max_length=4096)]
 
 
 class Untrue(Exception):
-    """What a part has said is a message, and cannot be so; nothing was changed by it.
+    """A message of a part that is valid but cannot be true; it changed nothing.
 
-    Its text goes on after 'it was told that', as in 'an edge is ... that has no end there'.
+    Its text continues the words 'it was told that', as in 'an edge is ... that has no end there'.
     """
 
 
 class Failed(msgspec.Struct, frozen=True):
-    """What went wrong in a part, as far as it can be told elsewhere.
+    """An error in a part, as far as it can be sent to another.
 
     Attributes:
       kind: the class of the error in `hfg.errors`.
-      text: its sentence.
-      path: of the node, if one failed; "" else.
-      what: where in its life it failed.
+      text: its message.
+      path: path of the node, if one failed, or "".
+      what: where it failed.
       trace: the user's frames, as text.
     """
 
@@ -137,30 +137,30 @@ class Open(msgspec.Struct, frozen=True, tag=True):
 
 
 class Opened(msgspec.Struct, frozen=True, tag=True):
-    """All nodes of the part are set up, or not."""
+    """Setup of the part's nodes has finished, or failed."""
 
     part: str
     failed: Failed | None = None
 
 
 class AskTime(msgspec.Struct, frozen=True, tag=True):
-    """What time is it there, on the monotonic clock; `asked` comes back with the answer."""
+    """Request for the time on the monotonic clock; `asked` is returned with the answer."""
 
     asked: float
 
 
 class TellTime(msgspec.Struct, frozen=True, tag=True):
-    """It is so late here."""
+    """The answer."""
 
     asked: float
     told: float
 
 
 class Keep(msgspec.Struct, frozen=True, tag=True):
-    """What a part has done until now is to be kept.
+    """Request to store the state of a part.
 
     Attributes:
-      number: counts what this life of it has asked to be kept.
+      number: counts the requests of this incarnation.
       data: see `keeping`.
     """
 
@@ -169,13 +169,13 @@ class Keep(msgspec.Struct, frozen=True, tag=True):
 
 
 class Kept(msgspec.Struct, frozen=True, tag=True):
-    """It is kept: what is in it may be told to others."""
+    """The state is stored: its consequences may be sent to others."""
 
     number: int
 
 
 class Begin(msgspec.Struct, frozen=True, tag=True):
-    """All parts are set up: go."""
+    """All parts are set up: start."""
 
 
 class Ask(msgspec.Struct, frozen=True, tag=True):
@@ -185,7 +185,7 @@ class Ask(msgspec.Struct, frozen=True, tag=True):
 
 
 class Told(msgspec.Struct, frozen=True, tag=True):
-    """What a part has answered to it."""
+    """The answer of a part to it."""
 
     answer: Answer
 
@@ -211,11 +211,11 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
 
 
 class Call(msgspec.Struct, frozen=True, tag=True):
-    """Do something with the part that somebody outside has asked for.
+    """A request from outside to the part.
 
     Attributes:
-      number: of the call; nobody waits for the result of number 0.
-      verb: which of the methods of `serving`.
+      number: number of the call; the result of number 0 is ignored.
+      verb: a method of `serving`.
       arguments: by name.
     """
 
@@ -225,7 +225,7 @@ class Call(msgspec.Struct, frozen=True, tag=True):
 
 
 class Result(msgspec.Struct, frozen=True, tag=True):
-    """What came of it."""
+    """The result of a call."""
 
     number: int
     value: Any = None
@@ -291,13 +291,13 @@ Sight: TypeAlias = PlainEvent | Passed
 
 
 class Seen(msgspec.Struct, frozen=True, tag=True):
-    """What somebody outside looks at has come by, in order.
+    """Observed events or tokens, in order.
 
     Attributes:
-      number: of the call by which he has asked for it.
-      events: of the trace.
-      tokens: at a tap or a breakpoint.
-      count: how many have passed there by now, those included that were skipped.
+      number: number of the call that asked for them.
+      events: events of the trace.
+      tokens: tokens at a tap or a breakpoint.
+      count: how many have passed there so far, including skipped ones.
     """
 
     number: int
@@ -333,7 +333,7 @@ class Closed(msgspec.Struct, frozen=True, tag=True):
 
 
 class Speaks(msgspec.Struct, frozen=True, tag=True):
-    """The producer of an edge is enabled from now on, or not, behind so many tokens."""
+    """The producer of an edge is enabled or disabled from now on, after so many tokens."""
 
     label: Label
     speaking: bool
@@ -341,7 +341,7 @@ class Speaks(msgspec.Struct, frozen=True, tag=True):
 
 
 class Hears(msgspec.Struct, frozen=True, tag=True):
-    """What the consumer of an edge does with tokens from now on, having taken so many."""
+    """How the consumer of an edge handles tokens from now on, having taken so many."""
 
     label: Label
     hearing: Hearing
@@ -349,21 +349,21 @@ class Hears(msgspec.Struct, frozen=True, tag=True):
 
 
 class Reborn(msgspec.Struct, frozen=True, tag=True):
-    """A part has died and begins anew: from now on this life of it is believed."""
+    """A part has died and is restarted: from now on this incarnation is trusted."""
 
     part: str
     life: Counted
 
 
 class Joins(msgspec.Struct, frozen=True, tag=True):
-    """Where a life of a part that has begun anew goes on with an edge, said by the older life at its other end.
+    """Where a restarted part resumes an edge, reported by the older incarnation at the other end.
 
     Attributes:
-      label: of the edge.
-      total: how many tokens are done, said by the producer; how many have come, said by the consumer.
+      label: label of the edge.
+      total: from the producer: how many tokens are processed; from the consumer: how many have arrived.
       stream, number: the position of the last of them; or `UNKNOWN`.
-      hearing: what the consumer does with tokens.
-      ended: END was sent and has come; said by the producer, it is not among the tokens that are counted.
+      hearing: how the consumer handles tokens.
+      ended: END was sent and has arrived; if reported by the producer, it is not included in the count.
     """
 
     label: Label
@@ -375,11 +375,11 @@ class Joins(msgspec.Struct, frozen=True, tag=True):
 
 
 class GoesOn(msgspec.Struct, frozen=True, tag=True):
-    """Behind which position a producer goes on that has begun anew, once it knows that.
+    """The position after which a restarted producer resumes, once it is known.
 
     Attributes:
-      label: of the edge.
-      stream, number: the position of the last token that was done.
+      label: label of the edge.
+      stream, number: the position of the last processed token.
     """
 
     label: Label
@@ -392,9 +392,9 @@ class Logged(msgspec.Struct, frozen=True, tag=True):
 
     Attributes:
       logger: its name.
-      level: of the record.
+      level: level of the record.
       text: the whole message, with the trace of an exception if there is one.
-      path: of the node that has logged; "" else.
+      path: path of the node that logged it, or "".
       created: when, in seconds since 1970.
       file, line, function: where in the code.
     """
@@ -438,7 +438,7 @@ class Sees(msgspec.Struct, frozen=True, tag=True):
 
 
 OfAnEdge: TypeAlias = Speaks | Hears | Joins | GoesOn | Shares | Sees
-"""What the two ends of an edge between parts tell each other."""
+"""Messages between the two ends of an edge between parts."""
 
 Message: TypeAlias = (
     Open
@@ -475,7 +475,7 @@ _decoder: Final[msgspec.msgpack.Decoder[Message]] = msgspec.msgpack.Decoder(Mess
 
 
 def unpack(data: Buffer) -> Message | None:
-    """Make a message of bytes; None of what is none, however deep it is or whatever stands where text should."""
+    """Return the message in some bytes; None if they are not a message, however deeply nested or malformed."""
     try:
         return _decoder.decode(data)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):

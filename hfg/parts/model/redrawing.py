@@ -1,7 +1,7 @@
-"""Which parts of a cut graph an edit concerns, and what of it no run in several processes can follow (rules L1, R4).
+"""Which parts of a cut graph an edit concerns, and which edits a run in several processes cannot follow (rules L1, R4).
 
-Each edit takes effect in one part, at one moment, as in a graph that is whole. What lies between parts stays as it is:
-both ends of a link would have to change at the same moment. Decides, never waits. Stands on graphs that are cut.
+Each edit takes effect in one part, at one moment, as in a graph in one process. Edges between parts stay unchanged:
+both ends of a link would have to change at the same moment. Decides, never waits. Depends on graphs that are cut.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ __all__ = ["Concern", "concerned"]
 
 
 class Concern(NamedTuple):
-    """What an edit concerns.
+    """The part that an edit concerns.
 
     Attributes:
-      part: in which it takes effect; the main one for what only the drawing shows.
-      reshapes: whether it changes more there than values of parameters.
+      part: the part in which it takes effect; the main part for changes that only the drawing shows.
+      reshapes: whether it changes more than values of parameters.
     """
 
     part: str
@@ -32,18 +32,18 @@ class Concern(NamedTuple):
 
 
 def concerned(before: Cutting, after: Cutting, changes: Sequence[Change]) -> Concern:
-    """Find out what an edit concerns.
+    """Return the part that an edit concerns.
 
     Args:
-      before: the graph as it runs.
+      before: the running graph.
       after: the same with the changes.
       changes: of the edit.
 
     Raises:
-      UsageError: it concerns several, or what lies between them.
+      UsageError: it concerns several parts, or an edge between parts.
     """
     if after.findings:
-        raise UsageError(f"the edit is refused, for the graph could not be cut any more: {after.findings[0]}")
+        raise UsageError(f"the edit is refused because the graph could no longer be cut: {after.findings[0]}")
     _need_same_parts(before, after)
     _need_same_subgraphs(before, after)
     _need_same_names(before, after)
@@ -54,7 +54,7 @@ def concerned(before: Cutting, after: Cutting, changes: Sequence[Change]) -> Con
     parts = reshaped | valued
     if len(parts) > 1:
         raise UsageError(
-            f"the edit concerns {_listed(parts)} at once, and there is no moment that several processes share: make "
+            f"the edit concerns {_listed(parts)} at once, and several processes have no common moment: make "
             "one edit for each"
         )
     part = parts.pop() if parts else MAIN
@@ -70,18 +70,18 @@ def concerned(before: Cutting, after: Cutting, changes: Sequence[Change]) -> Con
 def _need_same_parts(before: Cutting, after: Cutting) -> None:
     for name in before.parts.keys() - after.parts.keys():
         raise UsageError(
-            f'group "{name}" would have no node left, and its process goes on as long as the run: leave one there, or '
-            "end the run"
+            f'group "{name}" would have no node left, and its process runs as long as the run: leave a node '
+            "there, or end the run"
         )
     for name in after.parts.keys() - before.parts.keys():
         raise UsageError(
-            f'group "{name}" has no process in this run, for no node was in it when it began: put the node into '
-            "another group, or end the run and change the graph before the next one"
+            f'group "{name}" has no process in this run because it had no node when the run started: put the '
+            "node into another group, or end the run and change the graph before the next one"
         )
 
 
 def _need_same_subgraphs(before: Cutting, after: Cutting) -> None:
-    """All parts have the subgraphs, for each derives of its own nodes what they are (G2)."""
+    """Check that subgraphs are unchanged, because all parts derive the state of their own nodes from them (G2)."""
     was, will_be = (
         {one.path: (id(one.subgraph), one.options) for one in cutting.parts[MAIN].scopes} for cutting in (before, after)
     )
@@ -93,7 +93,7 @@ def _need_same_subgraphs(before: Cutting, after: Cutting) -> None:
 
 
 def _need_same_names(before: Cutting, after: Cutting) -> None:
-    """Who looks at a node of another process, or has set a parameter there, knows it by its path."""
+    """Check that names are unchanged: code that observes or has set a node of another process knows it by its path."""
     for part, flat in before.parts.items():
         if part == MAIN:
             continue
@@ -111,23 +111,26 @@ def _need_same_links(before: Cutting, after: Cutting) -> None:
     was, will_be = ({edge.label: _link(edge) for edge in one.edges} for one in (before, after))
     for label in _others(was, will_be):
         raise UsageError(
-            f'"{label}" leads from one process to another, and such edges stay as they are while the graph runs: '
-            "edit what lies within one process, or end the run and change the graph before the next one"
+            f'"{label}" leads from one process to another, and such edges cannot change while the graph runs: '
+            "edit something within one process, or end the run and change the graph before the next one"
         )
 
 
 def _need_same_promises(before: Cutting, after: Cutting) -> None:
-    """What is done when a part dies was agreed on when the run began, and hangs on its shape (rule L2)."""
+    """Check that the handling of deaths is unchanged (rule L2).
+
+    It was agreed on at the start of the run, and depends on the graph's shape.
+    """
     for part in sorted(inheriting(before) ^ inheriting(after)):
         raise UsageError(
-            f'the process of group "{part}" loses nothing when it dies as long as each token that comes in gives just '
-            "one on each edge that leaves, and by this edit that would be otherwise: keep to it, or end the run and "
-            "change the graph before the next one"
+            f'the process of group "{part}" loses nothing when it dies as long as each incoming token yields '
+            "exactly one on each leaving edge, and this edit would change that: preserve it, or end the run "
+            "and change the graph before the next one"
         )
 
 
 def _others(was: Mapping[str, Any], will_be: Mapping[str, Any]) -> list[str]:
-    """What comes, goes, or is another."""
+    """Return what is added, removed, or changed."""
     return [name for name in {**was, **will_be} if was.get(name) != will_be.get(name)]
 
 
@@ -137,7 +140,7 @@ def _listed(parts: set[str]) -> str:
 
 
 def _shape(flat: FlatGraph) -> tuple[Any, ...]:
-    """What an engine that runs it can tell."""
+    """Return the parts of a graph that matter to an engine that runs it."""
     names = [node.path for node in flat.nodes]
     scopes = [(one.path, one.options, [names[member] for member in one.members]) for one in flat.scopes if one.members]
     gates = [(_name(flat, gate.target), _name(flat, gate.by), gate.idle_rate_hz) for gate in flat.gates]

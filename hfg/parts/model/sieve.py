@@ -1,4 +1,4 @@
-"""Which events of the trace a part tells, for of what passes an edge between two parts both see something (rule R7)."""
+"""Selects the trace events that a part reports: both parts of an edge between them see some of its events (rule R7)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ __all__ = ["sieve"]
 
 
 def sieve(part: str, edges: Iterable[CutEdge]) -> Callable[[TraceEvent], bool]:
-    """Give what says whether an event of the trace is told by a part: each edge between two is in both.
+    """Return a filter for the trace events that a part reports; each edge between two parts is in both.
 
-    The source's part tells what is sent and processed, the target's what is taken.
+    The source's part reports sent and processed tokens, the target's part taken ones.
     """
     edges = tuple(edges)
     leaving = {edge.label for edge in edges if edge.source == part}

@@ -1,11 +1,11 @@
 """Parts in processes of this host.
 
-worker     a part that somebody else has begun
+worker     a part that another process has started
 process    the process around it
 spares     a process that has imported hfg and waits
-launching  where parts are begun
-meeting    the folder in which they meet
-other      what the main part knows of another
+launching  starts parts
+meeting    the folder of their sockets
+other      the main part's state of another part
 """
 
 __all__: list[str] = []

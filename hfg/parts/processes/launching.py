@@ -1,7 +1,7 @@
-"""Where the other parts of a run are begun: in processes of this host, or, in virtual time, on the same loop.
+"""Starts the other parts of a run: in processes of this host, or, in virtual time, on the same loop.
 
-A process gets what it needs to know on its standard input, which stays open: where that ends, whoever began it is gone,
-and it goes too. Stands on `worker` and `transports`.
+A process gets its instructions on its standard input, which stays open. When it closes, the process that started it is
+gone, so it exits, too. Depends on `worker` and `transports`.
 """
 
 from __future__ import annotations
@@ -31,30 +31,30 @@ from hfg.transport import Buffer, Session
 __all__ = ["BEAT_S", "STARTS_S", "Begun", "LoopLauncher", "PartProcess", "ProcessLauncher", "beat_of", "build_graph"]
 
 BEAT_S: Final = 0.5
-"""How often a process says that its event loop goes round."""
+"""How often a process reports that its event loop is running."""
 
 STARTS_S: Final = 60.0
-"""How long it may take until it says anything."""
+"""How long it may take until its first message."""
 
-_ENDS_S: Final = 2.0  # how long a process may take to go by itself, once it was told
+_ENDS_S: Final = 2.0  # how long a process may take to exit by itself, once it was told to
 
 
 class Begun(msgspec.Struct, frozen=True):
-    """What a process is told on its standard input, as one line of JSON.
+    """The instructions for a process on its standard input, as one line of JSON.
 
     Attributes:
-      run: by which name all parts know the run.
-      part: the name of the part that it is to serve.
-      lives: which life this is of it, and which of the main part.
-      settings: of the network; None if all parts are on this host.
-      argv: what the program was called with; its main file may read that when it is imported.
-      main: the file of the program, for node types that are in it; "" if there is none.
+      run: the name by which all parts know the run.
+      part: name of the part that it should serve.
+      lives: its incarnation, and that of the main part.
+      settings: settings of the network; None if all parts are on this host.
+      argv: arguments of the program, which its main file may read when it is imported.
+      main: the file of the program, for node types in it; "" if there is none.
       targets: other files that hfg itself has imported, by the name of the module.
-      path: where modules are found.
-      parent: the process that has begun it; when that is gone, the folder is of no use to anybody.
-      folder: in which the parts on this host meet.
-      beat: the key on which the process says that its event loop goes round.
-      level: of log records that are of use to the main program.
+      path: search path for modules.
+      parent: the process that has started it; when it is gone, the folder is no longer needed.
+      folder: the folder in which the parts on this host connect.
+      beat: the key on which the process reports that its event loop is running.
+      level: level of the log records that the main program wants.
     """
 
     run: str
@@ -72,10 +72,10 @@ class Begun(msgspec.Struct, frozen=True):
 
 
 def build_graph(message: Open, *, beside: Path | None = None) -> Graph:
-    """Make the graph of the text that came.
+    """Make the graph from the received text.
 
     Raises:
-      FileError: it describes none, or names what is not here.
+      FileError: it does not describe a graph, or names something that does not exist here.
     """
     from hfg.files import building
     from hfg.files.findings import Findings
@@ -228,7 +228,7 @@ class ProcessLauncher:
     async def close(self) -> None:
         """See `Launcher`."""
         await self._spares.close()
-        if self._opening is not None:  # who was interrupted amid it would leave what it makes in the folder
+        if self._opening is not None:  # an interruption during it would leave its files in the folder
             with contextlib.suppress(HfgError):
                 for session in set(await self._opening):
                     await session.close()
@@ -237,21 +237,21 @@ class ProcessLauncher:
 
 
 def beat_of(run: str, part: str, life: int) -> str:
-    """Give the key on which a process says that its event loop goes round."""
+    """Return the key on which a process reports that its event loop is running."""
     return f"{run}/beat/{name_of(part)}/{life}"
 
 
 def _patience_s() -> float:
-    """Give how long the event loop of a process may stand still; 0 is for ever."""
+    """Return how long the event loop of a process may block; 0 means forever."""
     said = os.environ.get("HFG_PROCESS_SILENCE_S", "5")
     try:
         return max(float(said), 0.0)
     except ValueError:
-        raise UsageError(f"HFG_PROCESS_SILENCE_S is a number of seconds, 0 for ever, got {said!r}") from None
+        raise UsageError(f"HFG_PROCESS_SILENCE_S must be a number of seconds, 0 for no limit, got {said!r}") from None
 
 
 def _main_program() -> str:
-    """Give the file of the program, whose node types may be in the graph; not that of a command, which has none."""
+    """Return the file of the program, whose node types may be in the graph, unless it is a command without any."""
     main = sys.modules.get("__main__")
     if main is None or getattr(main, "__spec__", None) is not None:
         return ""
@@ -260,17 +260,17 @@ def _main_program() -> str:
 
 
 def _targets() -> dict[str, str]:
-    """Give the files that the command line has imported, under names of its own."""
+    """Return the files that the command line has imported under names of its own."""
     found = {name: module for name, module in list(sys.modules.items()) if name.startswith("hfg_target_")}
     return {name: module.__file__ for name, module in found.items() if module.__file__ is not None}
 
 
 class PartProcess:
-    """A part in a process of its own; also the main part, where an agent runs it.
+    """A part in a process of its own, including the main part when an agent runs it.
 
     Attributes:
       process: its id.
-      output: what it writes, where somebody has asked for it.
+      output: its output, if requested.
     """
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
@@ -295,7 +295,7 @@ class PartProcess:
         self._silent_s = 0.0
 
     def _hear(self, beats: list[tuple[Buffer, Buffer]]) -> None:
-        del beats  # that they came is all they say
+        del beats  # only their arrival matters
         self._silent_s = 0.0
         if self._patience_s == STARTS_S:
             self._patience_s = float("inf")  # a setup may take as long as it likes
@@ -306,7 +306,7 @@ class PartProcess:
             await asyncio.sleep(BEAT_S)
             self._silent_s += BEAT_S
             if self._silent_s > self._patience_s:
-                self._why_killed = f", for its event loop has not gone round for {self._silent_s:g} s"
+                self._why_killed = f" because its event loop has been blocked for {self._silent_s:g} s"
                 with contextlib.suppress(ProcessLookupError):
                     self._process.kill()
                 return
@@ -321,25 +321,25 @@ class PartProcess:
         keeps_output: bool = False,
         spares: Spares | None = None,
     ) -> PartProcess:
-        """Begin it.
+        """Start the process.
 
         Args:
-          part: the name of its group, which a list of processes shows.
-          begun: what it is told on its standard input, which stays open.
-          module: what it runs.
-          keeps_output: what it writes is to be read from `output`; else it goes where that of this process goes.
-          spares: whose process it becomes if there is one; they agree in what they run and in `keeps_output`.
+          part: the name of its group, shown in process listings.
+          begun: the instructions on its standard input, which stays open.
+          module: the module that it runs.
+          keeps_output: its output can be read from `output`; otherwise it goes where this process's output goes.
+          spares: provides a spare process, if there is one, with the same `module` and `keeps_output`.
 
         Raises:
-          TransportError: it cannot be begun.
+          TransportError: it cannot be started.
         """
         process = None if spares is None else spares.take()
         try:
             process = process or await start(part, module, keeps_output=keeps_output)
         except OSError as error:
-            raise TransportError(f'no process can be begun for group "{part}": {error}') from error
+            raise TransportError(f'cannot start a process for group "{part}": {error}') from error
         assert process.stdin is not None
-        with contextlib.suppress(ConnectionError):  # it is gone already, which is told by whoever waits for it
+        with contextlib.suppress(ConnectionError):  # it is already gone, which the code that waits for it reports
             process.stdin.write(msgspec.json.encode(begun) + b"\n")
             await process.stdin.drain()
         return cls(process)

@@ -1,9 +1,9 @@
-"""A folder in which the parts of one run on one host meet: only this user can enter it (rule L5).
+"""A folder in which the parts of one run on one host connect: only this user can enter it (rule L5).
 
-However a run ends, its folder goes: by `leave`, or `leave_all` where the process ends without a teardown; by the end of
-the interpreter where nobody comes to either; by a part that sees that the main one was killed, and if that had no
-other process yet, by the next run on this machine. Who lives holds a lock on the folder, so that no other run takes it
-for one that was left. Depends on `clocks` and `hfg.base.sockets`.
+The folder is removed however a run ends: by `leave`; by `leave_all` if the process ends without a teardown; at the exit
+of the interpreter if neither was called; by a part that notices that the main part was killed; or, if there was no
+other process yet, by the next run on this machine. A living run holds a lock on the folder, so that no other run takes
+it for an abandoned one. Depends on `clocks` and `hfg.base.sockets`.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ if sys.platform != "win32":
 __all__ = ["MeetingPlace", "remove"]
 
 _MACHINE: Final = hashlib.blake2b(machine().encode(), digest_size=4).hexdigest()
-_PREFIX: Final = f"hfg-meet-{_MACHINE}-"  # a lock may be of one machine, and the directory of several
+_PREFIX: Final = f"hfg-meet-{_MACHINE}-"  # a lock may belong to one machine, and the directory to several
 _NAME: Final = re.compile(re.escape(_PREFIX) + r"[a-z0-9_]{8}")
-_SECRET: Final = re.compile(r"secret(-[0-9a-f]+)?")  # which sessions make in it, beside their sockets
-_YOUNG_S: Final = 60.0  # a folder so young may belong to who has not come to lock it yet
+_SECRET: Final = re.compile(r"secret(-[0-9a-f]+)?")  # made by sessions, next to their sockets
+_YOUNG_S: Final = 60.0  # the run of a newer folder may not have locked it yet
 
 
 class MeetingPlace:
-    """The folder of a run that lives.
+    """The folder of a living run.
 
     Attributes:
       folder: in the directory for temporary files.
@@ -44,13 +44,13 @@ class MeetingPlace:
     _of_this_process: ClassVar[weakref.WeakSet[MeetingPlace]] = weakref.WeakSet()
 
     def __init__(self) -> None:
-        """Make one, and remove those that runs of this user have left which were killed.
+        """Make a folder, and remove folders of this user's runs that were killed.
 
         Raises:
           OSError: there is no room for it.
         """
         _sweep(Path(tempfile.gettempdir()))
-        self.folder = Path(tempfile.mkdtemp(prefix=_PREFIX))  # which nobody else can enter
+        self.folder = Path(tempfile.mkdtemp(prefix=_PREFIX))  # only this user can enter it
         self._left = weakref.finalize(self, _leave, self.folder, os.getpid())
         self._lock = _lock(self.folder)
         self._of_this_process.add(self)
@@ -64,19 +64,19 @@ class MeetingPlace:
 
     @classmethod
     def leave_all(cls) -> None:
-        """Remove those of this process, which ends at once; from any thread."""
+        """Remove the folders of this process, which ends at once; from any thread."""
         for place in tuple(cls._of_this_process):
             place.leave()
 
 
 def _leave(folder: Path, process: int) -> None:
-    """Remove it; a process that was forked from ours leaves it alone."""
+    """Remove it, unless this process was forked from the owner."""
     if os.getpid() == process:
         remove(folder)
 
 
 def remove(folder: Path) -> None:
-    """Remove what is ours in it, and it, if nothing else is."""
+    """Remove our files in it, and the folder itself if it is empty."""
     with contextlib.suppress(OSError):
         for file in folder.iterdir():
             if _SECRET.fullmatch(file.name) or SOCKET_FILE.fullmatch(file.name):
@@ -85,9 +85,9 @@ def remove(folder: Path) -> None:
 
 
 def _sweep(place: Path) -> None:
-    """Remove the folders in `place` whose runs are over; what cannot be looked at is not ours."""
+    """Remove the folders in `place` whose runs are over; folders that cannot be read are not ours."""
     if sys.platform == "win32":
-        return  # where such sockets are not, nor locks of folders
+        return  # on systems without such sockets or locks of folders
     folders: list[Path] = []
     with contextlib.suppress(PermissionError):  # users may be allowed to make folders there, but not to list them
         folders = list(place.iterdir())
@@ -105,7 +105,10 @@ def _sweep(place: Path) -> None:
 
 
 def _lock(folder: Path) -> int | None:
-    """Lock a folder for as long as what is given stays open; None if somebody has, or there are no such locks there."""
+    """Lock a folder for as long as the result stays open.
+
+    Return None if it is locked, or the system has no such locks.
+    """
     if sys.platform == "win32":
         return None
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)

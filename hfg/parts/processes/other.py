@@ -1,6 +1,6 @@
-"""Another part of a run, as the main one sees it: what runs it, whether it is there, and what it has said at the end.
+"""Another part of a run, as seen from the main part: its process, whether it is there, and its final report.
 
-Whoever can begin processes, here or on other hosts, is a `Launcher`. Stands on `channels` and `lives`.
+A `Launcher` starts processes, here or on other hosts. Depends on `channels` and `lives`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Launched(Protocol):
     process: int
 
     async def wait(self) -> str:
-        """Wait until it is gone; give a sentence about how, as in 'process 1234 was killed by SIGKILL'."""
+        """Wait until it is gone. Return a message about how, as in 'process 1234 was killed by SIGKILL'."""
 
     def begins(self) -> None:
         """Its nodes are set up and let go: from now on it may be expected to answer."""
@@ -38,12 +38,12 @@ class Launched(Protocol):
 
 
 class Launcher(Protocol):
-    """Begins the other parts, and gives the session over which they are spoken to.
+    """Starts the other parts, and provides the session for messages to them.
 
     Attributes:
       shares_memory: whether large arrays between parts of one host may go through shared memory.
-      is_in_realm: whether others can hear of the run on that session, and steer it.
-      near: once it is open, the session that reaches parts on this host; None if that of the main part does.
+      is_in_realm: whether other programs can find and control the run on that session.
+      near: once open: the session for parts on this host; None if the main part's session reaches them.
     """
 
     shares_memory: bool
@@ -54,47 +54,47 @@ class Launcher(Protocol):
         """See above."""
 
     async def open(self) -> Session:
-        """Give the session of the main part."""
+        """Return the session of the main part."""
 
     async def prepare(self, hosts: Mapping[str, str], modules: Mapping[str, str]) -> None:
-        """See whether all that will be needed is there; nothing has been begun yet.
+        """Check that everything needed is available, before anything is started.
 
         Args:
-          hosts: where each part is to be; "" is here.
-          modules: that will be imported there, each with a place in the graph that needs it.
+          hosts: the host of each part; "" is this one.
+          modules: modules that will be imported there, each with a place in the graph that needs it.
 
         Raises:
-          TransportError: something is not.
+          TransportError: something is missing.
         """
 
     async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Launched:
-        """Begin a part, which then serves (see `worker`).
+        """Start a part, which then serves (see `worker`).
 
         Args:
-          run: by which name all parts know the run.
+          run: the name by which all parts know the run.
           part: its name.
-          host: where; "" is here.
-          lives: which life this is of it, and which of the main part.
+          host: its host; "" is this one.
+          lives: its incarnation, and that of the main part.
 
         Raises:
-          HfgError: it cannot be begun; nothing is left of it.
+          HfgError: it cannot be started; nothing is left of it.
         """
 
     async def close(self) -> None:
-        """End the session, and whatever else was begun."""
+        """End the session, and everything else that was started."""
 
 
 class Other:
-    """Another part, as the main one sees it.
+    """Another part, as seen from the main part.
 
     Attributes:
-      name: of its group.
+      name: name of its group.
       closed: done when it has reported, or is gone.
-      report: what it has said at the end.
-      deaths: of its processes.
-      state: "starting", "running", or "returning": it is gone, and begins anew.
-      restarts: how often it has begun anew.
-      is_told: there is a process that hears what is said, and knows of other parts what was true when it began.
+      report: its final report.
+      deaths: history of its processes' deaths.
+      state: "starting", "running", or "returning": it is gone, and will be restarted.
+      restarts: how often it was restarted.
+      is_told: there is a process that receives messages, and knows the state of other parts as of its start.
     """
 
     def __init__(self, name: str) -> None:
@@ -124,7 +124,7 @@ class Other:
         self.closed = asyncio.get_running_loop().create_future()
 
     def _not_opened(self) -> None:
-        """Whoever waits until it is set up goes on waiting when another life of it takes the place of one that dies."""
+        """Prepare for another incarnation to be set up; code that waits for the setup keeps waiting."""
         if self._opened is None or self._opened.done():
             self._opened = asyncio.get_running_loop().create_future()
 
@@ -138,7 +138,7 @@ class Other:
         await asyncio.shield(self._opened)
 
     def live(self, launched: Launched, gone: Callable[[str], None]) -> None:
-        """Something runs it from now on; `gone` is told when that is gone without having been asked to leave."""
+        """A process runs it from now on; `gone` is called when it is gone without having been asked to leave."""
         self._launched = launched
         self._since = asyncio.get_running_loop().time()
 
@@ -159,17 +159,17 @@ class Other:
 
     @property
     def is_there(self) -> bool:
-        """Whether it was begun, and is not gone."""
+        """Whether it was started, and is not gone."""
         return self._launched is not None and not self._gone
 
     @property
     def is_leaving(self) -> bool:
-        """Whether it was told to go."""
+        """Whether it was told to leave."""
         return self._leaves
 
     @property
     def is_keeping(self) -> bool:
-        """Whether what it said last is still being written into its ledger."""
+        """Whether its last state is still being written to its ledger."""
         return self._keeping is not None and not self._keeping.done()
 
     @property
@@ -183,15 +183,15 @@ class Other:
         return asyncio.get_running_loop().time() - self._since if self.process else 0.0
 
     def died(self) -> float | None:
-        """It is gone; gives for how long to wait until it begins anew, or None: it does not any more."""
+        """Record its death. Return the pause before the restart in seconds, or None: it is not restarted."""
         asked, self._is_restarted = self._is_restarted, False
         return 0.0 if asked else self.deaths.died(asyncio.get_running_loop().time())
 
     async def restart(self) -> None:
-        """End its process, as somebody has asked: that is no death, but else all follows from it.
+        """End its process on request. This does not count as a death, but has the same consequences.
 
         Raises:
-          UsageError: it does not run.
+          UsageError: it is not running.
         """
         if self._launched is None or self.state != "running":
             raise UsageError(f'the process of group "{self.name}" is {self.state}: nothing is to be restarted')
@@ -200,7 +200,7 @@ class Other:
         await self._launched.end()
 
     def let_go(self) -> None:
-        """Its nodes begin, if they are set up and have not begun."""
+        """Start its nodes, if they are set up and not started."""
         if self.state != "running" or self._was_let_go:
             return
         self._was_let_go = True
@@ -213,12 +213,12 @@ class Other:
         self._channel.send(message)
 
     def keep(self, keep: Callable[[Callable[[Message], None]], Coroutine[Any, Any, None]]) -> None:
-        """Write into its ledger by that, which is given what speaks to the process of now, and to no later."""
+        """Write to its ledger with `keep`, which gets the connection to the current process, and to no later one."""
         keeping = keep(self._channel.send)
         self._keeping = asyncio.get_running_loop().create_task(keeping, name=f"hfg ledger of {self.name}")
 
     def answer(self, error: HfgError | None) -> None:
-        """It is set up, or will not be."""
+        """It is set up, or setup has failed."""
         opened = self._opened
         if opened is not None and not opened.done():
             if error is None:
@@ -227,7 +227,7 @@ class Other:
                 opened.set_result(None)
             else:
                 opened.set_exception(error)
-                opened.exception()  # it may be that nobody waits for it any more
+                opened.exception()  # possibly nothing awaits it any more
 
     async def bury(self) -> None:
         """See to it that nothing is left of a life that is over."""
@@ -240,7 +240,7 @@ class Other:
             await asyncio.wait({self._keeping})
 
     def come_back(self, returning: Coroutine[Any, Any, None]) -> None:
-        """Begin its next life by that; one that died while it was set up is waited for no longer."""
+        """Start its next incarnation with `returning`; one that died during setup is no longer awaited."""
         if self._returning is not None:
             self._returning.cancel()
         self._returning = asyncio.get_running_loop().create_task(returning, name=f"hfg return of {self.name}")
@@ -252,11 +252,11 @@ class Other:
             await asyncio.wait({self._returning})
 
     def leaves(self) -> None:
-        """It is told to leave: from here on it may be gone."""
+        """It is told to leave: from now on it may be gone."""
         self._leaves = True
 
     def close(self, report: Closed) -> None:
-        """It has reported, and leaves."""
+        """It has sent its report, and leaves."""
         self.report = report
         if not self.closed.done():
             self.closed.set_result(None)

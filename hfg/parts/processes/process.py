@@ -1,8 +1,7 @@
-"""The process of one part: `python -m hfg.parts.processes.process`, begun by a launcher.
+"""The process of one part: `python -m hfg.parts.processes.process`, started by a launcher.
 
-That says on its standard input what to serve.
-
-When its standard input ends, whoever began it is gone, and it goes too, whatever it does.
+The launcher sends instructions on its standard input. When its standard input closes, the process that started it is
+gone, so it exits, too, whatever it is doing.
 """
 
 from __future__ import annotations
@@ -43,15 +42,15 @@ _PATIENCE_S: Final = 7.0
 
 
 def main() -> None:
-    """Serve a part, until the run is over or whoever began this is gone."""
+    """Serve a part, until the run is over or the process that started this one is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the main part, which ends this one
     line = sys.stdin.buffer.readline(_LONGEST)
     if not line and sys.argv[1:] == [SPARE]:
-        return  # nobody needed it
+        return  # it was not needed
     try:
         begun = msgspec.json.decode(line, type=Begun)
     except msgspec.DecodeError:
-        raise SystemExit("this process serves a part of a run, which begins it; use hfg run") from None
+        raise SystemExit("this process serves a part of a run, which starts it; use hfg run") from None
     _be_called(begun.part)
     sys.path[:] = begun.path
     sys.argv[:] = begun.argv
@@ -70,19 +69,19 @@ def main() -> None:
 
 
 def _be_called(part: str) -> None:
-    """Let lists of processes show the part, also if this was a spare process; where the system has a way for that."""
+    """Show the part's name in process listings, even if this was a spare process; where the system supports it."""
     with contextlib.suppress(OSError):
         Path("/proc/self/comm").write_text(f"hfg {part}"[:15])
 
 
 def _sweep(begun: Begun) -> None:
-    """Remove what a main part that was killed has left behind; one that lives does so itself."""
+    """Remove files left by a main part that was killed; a living one does so itself."""
     if begun.folder and os.getppid() != begun.parent:
         meeting.remove(Path(begun.folder))
 
 
 def _import(begun: Begun) -> RunError | None:
-    """Import what the main program has, for node types that are in it; gives what went wrong."""
+    """Import the modules of the main program, for node types in them. Return what went wrong."""
     file = begun.main
     try:
         if begun.main:
@@ -91,8 +90,9 @@ def _import(begun: Begun) -> RunError | None:
             _import_as(name, file)
     except (Exception, SystemExit) as error:
         problem = RunError(
-            f'the process of group "{begun.part}" cannot import "{file}" ({in_words(error)}): it does so for the node '
-            'types in it; put what runs the graph below `if __name__ == "__main__":`, or the node types into a module'
+            f'the process of group "{begun.part}" cannot import "{file}" ({in_words(error)}): it needs the '
+            'node types in it; put the code that runs the graph below `if __name__ == "__main__":`, or the '
+            "node types into a module"
         )
         problem.__cause__ = error
         return problem
@@ -117,7 +117,7 @@ class _ToMain(logging.Handler):
         self._log = log
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Put it into words, which is all that can be told."""
+        """Turn it into text, which is all that can be sent."""
         try:
             logged = Logged(
                 record.name,

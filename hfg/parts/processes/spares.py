@@ -1,7 +1,7 @@
-"""A process that has imported hfg and waits to be told what to serve, so that a part that dies is soon there again.
+"""A process that has imported hfg and waits for instructions, so that a part that dies is soon back.
 
-Importing is most of what a new life of a part takes. Short runs have no spare process: it is begun some seconds after
-the last part was, when nobody is in a hurry. Stands on nothing.
+Importing takes most of the time of a restart. Short runs have no spare process: it is started some seconds after the
+last part, when time does not matter. No dependencies.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ PROCESS: Final = "hfg.parts.processes.process"
 """The module that serves a part."""
 
 SPARE: Final = "spare"
-"""What a list of processes shows in place of the name of a group."""
+"""Shown in process listings in place of the name of a group."""
 
 AFTER_S = 2.0
-"""How long after a part was begun a spare process is."""
+"""Delay between the start of a part and that of a spare process."""
 
 
 async def start(name: str, module: str = PROCESS, *, keeps_output: bool = False) -> Process:
-    """Start a process, which waits for what it is told on its standard input.
+    """Start a process, which waits for instructions on its standard input.
 
     Args:
-      name: which a list of processes shows.
-      module: what it runs.
-      keeps_output: what it writes is to be read; else it goes where that of this process goes.
+      name: shown in process listings.
+      module: the module that it runs.
+      keeps_output: its output will be read; otherwise it goes where this process's output goes.
 
     Raises:
       OSError: it cannot be started.
     """
     return await asyncio.create_subprocess_exec(
         sys.executable,
-        "-P",  # not what lies in the current folder, which may be anybody's: this program's own path comes later
+        "-P",  # without the current folder, which may belong to another user; the program's own path is added later
         "-m",
         module,
         name,
@@ -67,7 +67,7 @@ class Spares:
         self._ending: set[asyncio.Task[int]] = set()
 
     def take(self) -> Process | None:
-        """Give the spare process, if there is one that a new one would be like; another is begun after a while."""
+        """Return the spare process, if it fits; another one is started after a while."""
         if self._timer is not None:
             self._timer.cancel()
         self._timer = asyncio.get_running_loop().call_later(AFTER_S, self._begin)
@@ -85,7 +85,7 @@ class Spares:
 
     async def _make(self) -> None:
         surroundings = _surroundings()
-        with contextlib.suppress(OSError):  # then there is none, and whoever needs a process is told why he gets none
+        with contextlib.suppress(OSError):  # then there is none, and code that needs a process reports the reason
             self._spare = await start(SPARE, keeps_output=self._keeps_output)
             self._surroundings = surroundings
 
@@ -97,7 +97,7 @@ class Spares:
         ending.add_done_callback(self._ending.discard)
 
     async def close(self) -> None:
-        """Have none any more."""
+        """End the spare process."""
         if self._timer is not None:
             self._timer.cancel()
         if self._making is not None:
@@ -122,5 +122,5 @@ def _environment() -> dict[str, str]:
 
 
 def _surroundings() -> object:
-    """What a process takes over from this one when it is started."""
+    """Return the settings that a process inherits from this one."""
     return dict(os.environ), Path.cwd()

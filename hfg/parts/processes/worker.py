@@ -1,6 +1,6 @@
-"""The part of a run that somebody else began: it makes its graph of what it is sent, and does as it is told.
+"""A part of a run that another process started: it makes its graph from the received text, and follows instructions.
 
-Stands on `channels` and the files of graphs; knows no processes.
+Depends on `channels` and the files of graphs, not on processes.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ __all__ = ["FIRST_LIFE", "Worker"]
 
 _LOGGER = Log("hfg.parts")
 FIRST_LIFE = 1
-_MOST_RECORDS = 1000  # that wait to be told
+_MOST_RECORDS = 1000  # waiting to be sent
 _ROUNDS = 8  # times that the time is asked for before the nodes are set up
 _ASKS_EVERY_S = 5.0
 _PARTING_S = 2.0  # how long the last words may take
@@ -73,11 +73,11 @@ class Worker:
     """Serves one part of a run.
 
     Args:
-      session: of the transport.
-      run: by which name all parts know the run.
-      name: of the part.
-      lives: which life this is of it, and which of the main part.
-      build: makes the graph of what comes.
+      session: session of the transport.
+      run: the name by which all parts know the run.
+      name: name of the part.
+      lives: its incarnation, and that of the main part.
+      build: makes the graph from the received text.
       near: the session that reaches parts on the same host; None if `session` does.
     """
 
@@ -101,7 +101,7 @@ class Worker:
         self._channels = {MAIN: Channel(session, run, name, MAIN, lives, self._inbox.put_nowait)}
         self._lives: dict[str, int] = {}  # of neighbours
         self._has_begun = False
-        self._asked = 0  # how often for the time, and not been told
+        self._asked = 0  # number of requests for the time without an answer
         self._part: Part | None = None
         self._carrier: Carrier | None = None
         self._shares_memory = False
@@ -111,7 +111,7 @@ class Worker:
         self._postponed: deque[Message] = deque()
 
     async def serve(self) -> None:
-        """Do as the main part says, until that says that it is over."""
+        """Follow the main part's instructions until it ends the run."""
         try:
             while True:
                 message = self._postponed.popleft() if self._postponed else await self._inbox.get()
@@ -121,9 +121,9 @@ class Worker:
                 try:
                     await self._do(message)
                 except Untrue as problem:
-                    self._channels[MAIN].refuse(f'it has said "{type(message).__name__}", {problem}')
+                    self._channels[MAIN].refuse(f'it has sent "{type(message).__name__}", {problem}')
         finally:
-            if self._part is not None and not self._is_closed:  # nobody is there any more who would say so
+            if self._part is not None and not self._is_closed:  # no other process is left that would report it
                 self._part.finish("cancelled", None)
                 if self._serving is not None:
                     self._serving.close()
@@ -131,10 +131,10 @@ class Worker:
             await self._leave()
 
     async def _do(self, message: Message) -> None:
-        """Do as the main part says.
+        """Follow an instruction of the main part.
 
         Raises:
-          Untrue: it cannot be meant.
+          Untrue: it makes no sense.
         """
         part = self._part
         if isinstance(message, Open):
@@ -190,7 +190,8 @@ class Worker:
         edges = list(cutting.edges_of(self._name))
         flat_part = cutting.parts[self._name]
         has_ledger = self._name in keeping(cutting)
-        options = message.options | ({"fast": False} if has_ledger else {})  # there is no between within a fused region
+        # there is no place between the nodes of a fused region
+        options = message.options | ({"fast": False} if has_ledger else {})
         composition = Composition(flat_part, Settings(**options))
         was_asked_for = bool(flat_part.groups[self._name].ledger)
         keeper = self._keeper(composition, message.kept, was_asked_for) if has_ledger else None
@@ -243,9 +244,9 @@ class Worker:
         return Channel(self._session, self._run, self._name, other, (self._life, life), hear)
 
     async def _admit(self, part: Part, message: Reborn) -> None:
-        """A neighbour has died and begins anew; nobody hears any more what was said to the one that died."""
+        """A neighbour has died and is restarted; messages to the one that died are lost."""
         if message.part not in self._lives or self._carrier is None:
-            return  # who is no neighbour
+            return  # not a neighbour
         if message.life <= max(self._lives[message.part], FIRST_LIFE):
             raise Untrue(f"of life {message.life} of {called(message.part)}, which has had later ones")
         old = self._channels[message.part]
@@ -290,9 +291,9 @@ class Worker:
     # --- what is said -----------------------------------------------------------------------------------------------
 
     def _hear(self, part: Part, other: str, message: Message) -> None:
-        """Another part has said something; what is to be done only the main one says."""
+        """Process a message of another part; only the main part gives instructions."""
         if not isinstance(message, OfAnEdge):
-            raise Untrue("which only the main part says")
+            raise Untrue("which only the main part may send")
         assert self._carrier is not None
         self._carrier.hear(other, message)
 
@@ -309,7 +310,7 @@ class Worker:
                 try:
                     message.question.check()
                 except msgspec.ValidationError as error:
-                    raise Untrue(f"which is no such question: {error}") from error
+                    raise Untrue(f"which is not such a question: {error}") from error
                 self._say(MAIN, Told(part.answer(message.question)))
             case Finish():
                 part.finish(message.outcome, None)
@@ -348,7 +349,7 @@ class Worker:
         if self._carrier is not None:
             await self._carrier.close()
         if self._shares_memory:
-            sweep_run(self._run)  # if the main part was killed, nobody else is left who would
+            sweep_run(self._run)  # if the main part was killed, no other process is left to do it
         for channel in self._channels.values():
             await channel.close()
 

@@ -1,6 +1,6 @@
 """Connects a part of a run with the links of all its edges to and from others.
 
-Stands on `ends`.
+Depends on `ends`.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ class Carrier:
         """Connect the part.
 
         Args:
-          part: nothing of which has begun yet.
-          session: reaches all parts.
-          near: reaches those on the same host.
-          run: by which name all parts of the run know it.
-          lives: which life of each part this is for.
-          edges: those between it and others.
-          say: brings a message to another part.
-          remembered: the edges whose producer knows in each life what it has sent in others, by label.
+          part: the part, not started yet.
+          session: the session that reaches all parts.
+          near: the session that reaches parts on the same host.
+          run: the name by which all parts know the run.
+          lives: the incarnations of all parts.
+          edges: the edges between it and others.
+          say: sends a message to another part.
+          remembered: labels of the edges whose producer remembers the tokens of its previous incarnations.
           shares_memory: large arrays between parts of one host may go through shared memory.
-          admits: parts of younger lives are there, and hear what they are told.
+          admits: parts of younger incarnations are there, and receive messages.
         """
         self._part = part
         self._links: dict[str, OutgoingEnd | IncomingEnd] = {}
@@ -74,17 +74,17 @@ class Carrier:
                 self.admit(other, life)
 
     def admit(self, other: str, life: int) -> None:
-        """Another part has died and begins anew, as that life."""
-        _LOGGER.info("%s: %s is there again, as life %d: its edges go on", called(self._part.name), called(other), life)
+        """Another part has died and is restarted as this incarnation."""
+        _LOGGER.info("%s: %s is back as incarnation %d: its edges resume", called(self._part.name), called(other), life)
         for link in self._links.values():
             if link.other == other:
                 link.admit(life)
 
     def hear(self, other: str, message: OfAnEdge) -> None:
-        """A part has said something of an edge.
+        """Process a part's message about an edge.
 
         Raises:
-          Untrue: it has no such end of an edge to this one, or that end cannot be so.
+          Untrue: it has no such edge to this part, or the message cannot be true.
         """
         label = message.label
         link = self._links.get(label)

@@ -1,6 +1,6 @@
 """Messages between the parts of a run, on a session of a transport: in order, and without loss.
 
-Stands on `hfg.links` and `messages`.
+Depends on `hfg.links` and `messages`.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from hfg.transport import Session
 __all__ = ["Channel", "called", "name_of"]
 
 _LOGGER = Log("hfg.parts")
-_WINDOW: Final = 64  # messages on their way
-_MAIN: Final = "main"  # what the part without a name is called in keys
+_WINDOW: Final = 64  # messages in transit
+_MAIN: Final = "main"  # name of the part without a name, in keys
 
 
 def name_of(part: str) -> str:
-    """Give what a part is called in the keys of a transport."""
+    """Return the name of a part in the keys of a transport."""
     return f"part {part}" if part else _MAIN
 
 
 def called(part: str) -> str:
-    """Return what people call a part: by its group, or as the main process."""
+    """Return the name of a part for users: its group, or the main process."""
     return f'group "{part}"' if part else "the main process"
 
 
 class Channel:
-    """Messages between two parts, in order and without loss, both ways.
+    """Messages between two parts, in order and without loss, in both directions.
 
-    What cannot leave at once waits in memory: there is little of it, and whoever says something goes on.
+    Messages that cannot leave at once wait in memory: there are few, and the sender continues.
 
     Attributes:
-      refused: how much has come that is no message, or says what cannot be so (L4).
+      refused: how many messages were malformed or cannot be true (L4).
     """
 
     def __init__(
@@ -53,11 +53,11 @@ class Channel:
         """Open this end.
 
         Args:
-          session: of the transport.
-          run: by which name all parts of the run know it.
+          session: session of the transport.
+          run: the name by which all parts know the run.
           here: the name of this part.
-          there: that of the other.
-          lives: which life of each this is.
+          there: the name of the other part.
+          lives: the incarnations of both.
           receive: called with each message; it may raise `Untrue`.
         """
         self._there = there
@@ -74,11 +74,11 @@ class Channel:
 
     @property
     def waiting(self) -> int:
-        """How many messages have not left."""
+        """Number of messages that have not left."""
         return len(self._waiting)
 
     def send(self, message: Message) -> None:
-        """Say something; it arrives when the other is there. Nothing is heard of it once this is closed."""
+        """Send a message; it arrives when the other part is there. After `close`, it is lost."""
         if self._is_closed:
             return
         self._waiting.append(message)
@@ -93,21 +93,21 @@ class Channel:
             message = unpack(delivery.token[1])
             self._in.done()
             if message is None:
-                self.refuse("it has sent what is no message")
+                self.refuse("it has sent something that is not a message")
                 continue
             try:
                 self._receive(message)
             except Untrue as problem:
-                self.refuse(f'it has said "{type(message).__name__}", {problem}')
+                self.refuse(f'it has sent "{type(message).__name__}", {problem}')
 
     def refuse(self, why: str) -> None:
-        """What has come changes nothing; it is counted, and logged the first time."""
+        """Ignore a message; count it, and log the first one."""
         self.refused += 1
         if self.refused == 1:
-            _LOGGER.warning("%s is not believed: %s; more of the kind is counted", called(self._there), why)
+            _LOGGER.warning("%s is not trusted: %s; further cases are only counted", called(self._there), why)
 
     async def flush(self, within_s: float) -> None:
-        """Wait until the other has all that was said, or for so long."""
+        """Wait until the other part has received everything, at most for `within_s`."""
         try:
             async with asyncio.timeout(within_s):
                 while self._waiting:
@@ -117,7 +117,7 @@ class Channel:
             pass
 
     async def close(self) -> None:
-        """End it."""
+        """Close the channel."""
         self._is_closed = True
         await self._out.close()
         await self._in.close()

@@ -1,7 +1,7 @@
-"""The near ends of edges between the parts of a run: links, and what is kept, lent and counted beside them.
+"""The near ends of edges between the parts of a run: links, with their ledgers, leases and counts.
 
-A link goes on when the other end has died and begins anew: the older of two lives tells the younger where (`Joins`).
-Stands on `hfg.links`, `part` and `messages`.
+When the other end has died and is restarted, the older of the two incarnations tells the younger where to resume
+(`Joins`). Depends on `hfg.links`, `part` and `messages`.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ _UNBOUNDED: Final = 2**31
 
 
 def _most_under_way(edge: CutEdge) -> int:
-    """Give how many tokens a link may hold.
+    """Return how many tokens a link may hold.
 
-    For signals the edge itself says so, and may come to say more (F8): a link that had a bound of its own would not
-    let go what the larger queue took in.
+    For signals the edge itself determines this, and may grow (F8): a link with a bound of its own would not send what
+    the larger queue has accepted.
     """
     return _UNBOUNDED if edge.edge.is_event_edge else edge.window
 
@@ -50,7 +50,7 @@ def _codec_of(edge: CutEdge) -> TokenCodec[Any]:
 
 
 class World(NamedTuple):
-    """What all near ends of a part know alike; see `Carrier`."""
+    """Shared state of all near ends of a part; see `Carrier`."""
 
     part: Part
     session: Session
@@ -65,7 +65,7 @@ class World(NamedTuple):
 
 
 class _NearEnd:
-    """What is alike at both ends of an edge between parts.
+    """Common part of both ends of an edge between parts.
 
     Attributes:
       other: the part at its far end.
@@ -82,7 +82,7 @@ class _NearEnd:
         self._tell = partial(world.say, other)
 
     def _fail(self, why: str, error: Exception) -> None:
-        """The edge cannot do what it has to: the run ends with that."""
+        """The edge has failed; the run ends with this error."""
         problem = RunError(f'edge "{self._edge.label}" {why}: {error}')
         problem.__cause__ = error
         self._part.finish("failed", problem)
@@ -92,11 +92,13 @@ class _NearEnd:
 
     def _need_to_join(self) -> None:
         if not self._waits_to_join:
-            raise Untrue(f'of edge "{self._edge.label}", which this life of {called(self._part.name)} knows already')
+            raise Untrue(
+                f'of edge "{self._edge.label}", which this incarnation of {name_of(self._part.name)} already knows'
+            )
 
 
 class OutgoingEnd(_NearEnd):
-    """The near end of the link of an edge that leaves."""
+    """The near end of a leaving edge's link."""
 
     def __init__(self, world: World, edge: CutEdge) -> None:
         super().__init__(world, edge, edge.target)
@@ -144,7 +146,7 @@ class OutgoingEnd(_NearEnd):
         return room if positions is None or room <= 0 else self._in_a_row(sender, positions, room)
 
     def _in_a_row(self, sender: LinkSender, positions: deque[Where], most: int) -> int:
-        """How many can be sent before numbers jump: that they do when all before is done."""
+        """Return how many can be sent before numbers jump: that they do when all before is done."""
         if not positions or not sender.machine.takes(Position(*positions[0])):
             return 0
         count = 1
@@ -180,7 +182,7 @@ class OutgoingEnd(_NearEnd):
         if repeated:
             outlet.repeat(repeated)
         if positions is not None and outlet.sent - self._unfinished > outlet.taken:
-            self._loop.call_soon(self._released)  # done before: nobody will say so again
+            self._loop.call_soon(self._released)  # already processed: there will be no other notification
 
     @property
     def _unfinished(self) -> int:
@@ -228,7 +230,7 @@ class OutgoingEnd(_NearEnd):
         self._part.be_taken(label, self._part.outlets[label].sent - self._unfinished)
 
     def admit(self, life: int) -> None:
-        """The consumer begins anew: it is sent what is not done, and told from where that is."""
+        """The consumer is restarted: resend unprocessed tokens, and tell it from where."""
         label, sender = self._edge.label, self._sender
         if isinstance(sender, LinkSender):
             sender.admit(name_of(self._edge.target), life)
@@ -253,10 +255,10 @@ class OutgoingEnd(_NearEnd):
         self._part.consumer_returns(label)
 
     def join(self, message: Joins) -> None:
-        """The consumer says what it has of former lives; it may wait to be told where this one goes on.
+        """The consumer reports the tokens from previous incarnations; it may wait to be told where this one resumes.
 
         Raises:
-          Untrue: nobody waits to be told.
+          Untrue: nothing waits for this report.
         """
         self._need_to_join()
         self._waits_to_join = False
@@ -276,7 +278,7 @@ class OutgoingEnd(_NearEnd):
             self._released()
 
     def _ahead_of(self, message: Joins) -> int:
-        """How many tokens former lives have kept, and this one sent, that the consumer has not got."""
+        """Return how many tokens former lives have kept, and this one sent, that the consumer has not got."""
         if not isinstance(self._sender, LinkSender):
             return 0
         stream, number = self._sender.machine.position
@@ -326,12 +328,12 @@ class IncomingEnd(_NearEnd):
         self._count = 0  # of signals: how many have come, through all lives
         self._laid: deque[int] = deque()  # the numbers of those that have come and are not done
         self._remembers = remembers
-        self._awaits_number = False  # a new life of the producer has not said yet where it goes on
+        self._awaits_number = False  # a new incarnation of the producer has not yet reported where it resumes
         self._borrowing: Borrowing | None = None
         self._undecoded: deque[Delivery] = deque()
         self._segment = partial(segment_of, world.run, edge=edge.number)
         self._lent_by = lives[edge.source]
-        self._before = 0  # tokens of former lives of the producer; of a lossy edge, where numbers tell what is lost
+        self._before = 0  # tokens of previous incarnations of the producer; for a lossy edge, whose numbers show losses
         self._receiver: LinkReceiver | BoundedReceiver
         way = world.way_of(edge)
         if edge.guarantee == "exact":
@@ -346,7 +348,7 @@ class IncomingEnd(_NearEnd):
                 ledger=None if part.keeper is None else part.keeper.position(edge.label),
             )
         else:
-            # What comes is laid on the edge at once, and that drops by the edge's own policy.
+            # Tokens are put on the edge at once, which drops by its own policy.
             self._receiver = BoundedReceiver(
                 way, self._key, arrived=self._arrived, capacity=_UNBOUNDED, producer=lives[edge.source]
             )
@@ -386,7 +388,7 @@ class IncomingEnd(_NearEnd):
             self._part.receive(self._edge.label, tokens)
 
     def _is_new(self, number: int, held: int) -> bool:
-        """Whether it comes behind all that came; what it has left behind is lost."""
+        """Return whether it comes after all tokens so far; the skipped ones are lost."""
         missing = self._before + number - 1 - self._part.inlets[self._edge.label].received - held
         if missing > 0:
             self._part.lose(self._edge.label, self._before + number - 1 - held)
@@ -394,7 +396,7 @@ class IncomingEnd(_NearEnd):
 
     def taken(self, total: int) -> None:
         """See `Incoming`."""
-        if self._part.keeper is not None:  # which lays each token that comes, and nothing else
+        if self._part.keeper is not None:  # it puts each token on the edge, and does nothing else
             if isinstance(self._receiver, LinkReceiver):
                 self._receiver.done(total - self._done)
             self._done = total
@@ -411,14 +413,15 @@ class IncomingEnd(_NearEnd):
         self._tell(Hears(self._edge.label, hearing, total))
 
     def admit(self, life: int) -> None:
-        """The producer begins anew: what it has sent until now is told to it."""
+        """The producer is restarted: tell it how much has arrived so far."""
         label, machine = self._edge.label, self._receiver.machine
         machine.believe(life)
         self._lent_by = life
-        if self._waits_to_join and self._undecoded:  # who would have told is gone: counting begins with what came
+        # the part that would have reported it is gone: count from what has arrived
+        if self._waits_to_join and self._undecoded:
             self._before = 1 - self._undecoded[0].position.sequence
         self._waits_to_join = False
-        if self._undecoded:  # they lie in the memory of a life that died before it could say so to this one
+        if self._undecoded:  # they are in the memory of an incarnation that died before it could report to this one
             self._borrowing = None
             self._decode()
         stream = number = 0
@@ -435,10 +438,10 @@ class IncomingEnd(_NearEnd):
         self._tell(Joins(label, came, stream, number, inlet.hearing, ended=self._part.is_over(label)))
 
     def join(self, message: Joins) -> None:
-        """The producer says what former lives have done.
+        """The producer reports the progress of previous incarnations.
 
         Raises:
-          Untrue: nobody waits to be told.
+          Untrue: nothing waits for this report.
         """
         self._need_to_join()
         total, keeper = message.total, self._part.keeper
@@ -446,7 +449,7 @@ class IncomingEnd(_NearEnd):
         if self._by_number:
             total = message.number
         elif ledger is not None and ledger.stream == message.stream:
-            total += max(ledger.sequence - message.number, 0)  # which the producer does not know to be done
+            total += max(ledger.sequence - message.number, 0)  # processed, but unknown to the producer
         self._count = total
         self._done += total
         self._before = message.total - message.number
@@ -457,7 +460,7 @@ class IncomingEnd(_NearEnd):
         self._decode()
 
     def goes_on(self, number: int) -> None:
-        """The producer says behind which number it goes on; nothing comes of it unless that is waited for."""
+        """The producer reports after which number it resumes; ignored unless it is awaited."""
         if self._awaits_number:
             self._awaits_number = False
             self._part.goes_on(self._edge.label, number)

@@ -1,11 +1,11 @@
-"""What a part with a ledger has done, as one piece of data, and how a new life of it goes on from there (rules L2, L4).
+"""The state of a part with a ledger, as one piece of data, and how a new incarnation resumes from it (rules L2, L4).
 
-Between two firings all there is to a part is the state of its nodes, what lies on its edges, and its places on those to
-and from other parts. That is kept together, or not at all. Until it is kept, nothing that came of it leaves the part,
-and no producer is told that anything of it is done: so whoever dies, what others have heard of the part and what the
-part knows of itself never differ, and no node has to do the same thing twice in the same way.
+Between two firings, a part consists of the state of its nodes, the tokens on its edges, and its positions on the edges
+to and from other parts. They are stored together, or not at all. Until they are stored, no consequence leaves the part,
+and no producer is told that a token is processed. So whatever dies, the part's own state never differs from what others
+know about it, and no node has to repeat its work identically.
 
-Decides, never waits. Stands on the engine; what `part` and `ends` know of edges comes from them.
+Decides, never waits. Depends on the engine; `part` and `ends` provide the data about edges.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ _AS_DATA: Final = 2
 
 
 class KeptEdge(msgspec.Struct, array_like=True):
-    """An edge between two firings.
+    """The state of an edge between two firings.
 
     Attributes:
-      sent: how many tokens were put on it, of an edge that comes in: and taken.
+      sent: how many tokens were put on it; for an incoming edge: and taken.
       ended: END was taken from it.
       end_sent: END was put on it, of an event edge.
-      tokens: what lies on it: value, modifier and stamp of each.
+      tokens: tokens on it: value, modifier and stamp of each.
     """
 
     sent: int
@@ -63,7 +63,7 @@ class KeptEdge(msgspec.Struct, array_like=True):
 
 
 class KeptOutbox(msgspec.Struct, array_like=True):
-    """What left over an edge and may not be done: see `Outbox`."""
+    """Tokens that left over an edge and may be unacknowledged: see `Outbox`."""
 
     stream: int
     first: int
@@ -91,43 +91,43 @@ class Snapshot(msgspec.Struct):
 
 
 def read(kept: bytes, part: str) -> Snapshot:
-    """Give what a ledger has kept.
+    """Return the data in a ledger.
 
     Raises:
-      RunError: it is nothing that this version of hfg has kept.
+      RunError: it is not data of this version of hfg.
     """
     try:
         snapshot = msgspec.msgpack.decode(kept, type=Snapshot)
     except msgspec.DecodeError as error:
-        raise RunError(f'the ledger of group "{part}" cannot be read ({error}): remove it to begin anew') from error
+        raise RunError(f'cannot read the ledger of group "{part}" ({error}): remove it to start over') from error
     if snapshot.version != _VERSION:
         raise RunError(
-            f'the ledger of group "{part}" was kept by another version of hfg ({snapshot.version}, this is '
-            f"{_VERSION}): let that one finish the run, or remove the ledger to begin anew"
+            f'the ledger of group "{part}" belongs to another version of hfg ({snapshot.version}, this is '
+            f"{_VERSION}): let that version finish the run, or remove the ledger to start over"
         )
     return snapshot
 
 
 class Leaving(Protocol):
-    """The link behind an edge that leaves a part with a ledger."""
+    """The link of an edge that leaves a part with a ledger."""
 
     def outbox(self) -> Outbox | None:
-        """Give what has left and may not be done, what waits to be kept included; None where signals may be lost."""
+        """Return the tokens that may be unacknowledged, including unstored ones; None if signals may be lost."""
 
     @property
     def held(self) -> int:
         """How many tokens wait until they are kept."""
 
     def let_go(self, count: int) -> None:
-        """So many of these are kept: they may leave."""
+        """`count` of these are stored: they may leave."""
 
 
 class _Asked(msgspec.Struct):
-    """What will be known when it is kept.
+    """What will be known when the state is stored.
 
     Attributes:
-      number: of the message.
-      signature: of the moment.
+      number: number of the message.
+      signature: signature of the moment.
       taken: how many tokens were taken, by label of the edge.
       held: how many tokens waited for it, by label of the edge.
     """
@@ -150,14 +150,14 @@ class Keeper:
         *,
         keeps_states: bool = True,
     ) -> None:
-        """Keep nothing yet.
+        """Start without storing anything.
 
         Args:
-          name: of the part.
-          engine: of the part, not begun yet.
-          keep: has data kept under a number; `be_kept` is called when it is.
-          kept: where former lives stopped.
-          keeps_states: the state of nodes as well as places on edges.
+          name: name of the part.
+          engine: engine of the part, not started yet.
+          keep: stores data under a number; `be_kept` is called when it is stored.
+          kept: the state at which previous incarnations stopped.
+          keeps_states: store the state of nodes as well as positions on edges.
         """
         self._keeps_states = keeps_states
         self.kept = kept
@@ -194,12 +194,12 @@ class Keeper:
                 edge.go_on(before[edge.label].sent, ended=False)
 
     def position(self, label: str) -> Position | None:
-        """Give the position of the last token of an edge that former lives have taken, if they have kept one."""
+        """Return the position of the last token of an edge that previous incarnations have taken, if stored."""
         where = None if self.kept is None else self.kept.coming.get(label)
         return None if where is None else Position(*where)
 
     def outbox(self, label: str) -> Outbox | None:
-        """Give what former lives have sent over an edge, if they have kept some."""
+        """Return the tokens that previous incarnations have sent over an edge, if stored."""
         found = None if self.kept is None else self.kept.leaving.get(label)
         return None if found is None else Outbox(found.stream, found.first, tuple(found.tokens))
 
@@ -210,13 +210,13 @@ class Keeper:
         self._wheres[label].extend(wheres)
 
     def rebased(self, label: str, total: int) -> None:
-        """So many more came to former lives, as the other end counts."""
+        """Count `total` more tokens for previous incarnations, according to the other end."""
         self._safe[label] += total
         if self._asked is not None:
             self._asked.taken[label] += total
 
     def safe(self, label: str) -> int:
-        """How many tokens were taken whose effects are kept."""
+        """Return how many tokens were taken whose effects are kept."""
         return self._safe[label]
 
     # --- keeping ----------------------------------------------------------------------------------------------------
@@ -265,11 +265,11 @@ class Keeper:
 
     def _look_again(self) -> None:
         self._is_due = False
-        self._not_before = 0.0  # a clock may stand a trifle before the moment for which it was set
+        self._not_before = 0.0  # a clock may fire slightly before the time for which it was set
         self._engine.guard(self.look)
 
     def be_kept(self, number: int) -> bool:
-        """It is kept: what has come of it may leave. Whether it is what was asked for last."""
+        """The state is stored: its consequences may leave. Return whether it is the latest request."""
         asked = self._asked
         if asked is None or asked.number != number:
             return False
@@ -285,8 +285,9 @@ class Keeper:
         if core.tasks:
             busy = next(worker.path for worker in core.workers if worker.tasks)
             raise RunError(
-                f'group "{self._name}" has a ledger, and node "{busy}" has started a task beside its firings, of which '
-                "nothing can be kept: await what it does in the firing, or take ledger= from the group"
+                f'group "{self._name}" has a ledger, and node "{busy}" has started a task concurrently with '
+                "its firings, whose state cannot be stored: await its work in the firing, or remove ledger= "
+                "from the group"
             )
         for label, inlet in self._inlets.items():
             wheres = self._wheres[label]
@@ -336,7 +337,7 @@ class Keeper:
     # --- going on ---------------------------------------------------------------------------------------------------
 
     def _recall(self, worker: Worker) -> None:
-        """Before a node is set up: give it the state that was kept of it."""
+        """Before a node is set up: restore its stored state."""
         assert self.kept is not None
         node = worker.node
         states = self.kept.states.get(worker.path)
@@ -348,7 +349,7 @@ class Keeper:
                 node.__dict__[name] = self._unpack(packed, hints[name], f'"{name}" of node "{worker.path}"')
 
     def go_on(self) -> None:
-        """The nodes are set up and let go, and none has moved: be where former lives stopped."""
+        """The nodes are set up and started, and none has moved: restore the stored state."""
         core = self._engine.core
         for worker in core.workers:
             if worker.node is not None and worker.scope is None:
@@ -365,7 +366,7 @@ class Keeper:
         edges = {edge.label: edge for edge in core.edges}
         self._end_again(kept)
         for label, found in kept.edges.items():
-            if label in self._inlets:  # on which new tokens lie already
+            if label in self._inlets:  # new tokens are already on it
                 edges[label].end(found.ended)
             else:
                 edges[label].clear()
@@ -391,7 +392,7 @@ class Keeper:
             drain_left(worker.in_edges)
 
     def _lay_again(self, edge: AnyEdge, found: KeptEdge) -> None:
-        """Lay the tokens on an edge that lay there."""
+        """Put the stored tokens back on an edge."""
         hint = getattr(edge.source_port, "type", Any)
         for packed, activity, stamp in found.tokens:
             value = self._unpack(packed, hint, f'a value on "{edge.label}"')
@@ -432,19 +433,19 @@ class Keeper:
                 strange += sorted(f"{path}.{name}" for name in states.keys() ^ node._type.states.keys())
         if strange:
             raise RunError(
-                f'the ledger of group "{self._name}" was kept of another graph: "{strange[0]}" is in one of them only; '
-                "run that graph to its end, or remove the ledger to begin anew"
+                f'the ledger of group "{self._name}" belongs to another graph: "{strange[0]}" is in only one '
+                "of them; run that graph to its end, or remove the ledger to start over"
             )
 
     # --- values -----------------------------------------------------------------------------------------------------
 
     def _hints_of(self, node: Node) -> dict[str, Any]:
-        """What is declared of the states of a node, or can be seen of how they begin."""
+        """Return the declared types of a node's states, or types derived from their initial values."""
         kind = type(node)
         if kind not in self._hints:
             try:
                 said = get_type_hints(kind)
-            except Exception:  # a name that is known to a type checker alone
+            except Exception:  # a name that exists only for type checkers
                 said = {}
             hints: dict[str, Any] = {}
             for name, state in node._type.states.items():
@@ -492,20 +493,21 @@ class Keeper:
             return found.copy() if isinstance(found, np.ndarray) else found
         except (EncodingError, msgspec.DecodeError) as error:
             raise RunError(
-                f'the ledger of group "{self._name}" cannot be used: {what} is no value of the type that it has now '
-                f"({error}); remove the ledger to begin anew"
+                f'the ledger of group "{self._name}" cannot be used: {what} is not a value of its current '
+                f"type ({error}); remove the ledger to start over"
             ) from error
 
     def _need_state(self, path: str, node: Node) -> None:
-        """What changes outside of `hfg.State` would be lost, and nobody would know."""
+        """Check that a node has no state outside `hfg.State`, which would be lost silently."""
         before = self._own[path]
         for name, value in _own(node).items():
             if name in before and _is_same(before[name], value):
                 continue
             raise RunError(
-                f'group "{self._name}" has a ledger, and node "{path}" keeps "{name}" outside of hfg.State, which '
-                f"{'changes' if name in before else 'appears'} while it runs and would be lost with its process: "
-                f"declare it as a state, as in {name} = hfg.State(0), or take ledger= from the group"
+                f'group "{self._name}" has a ledger, and node "{path}" keeps "{name}" outside of '
+                f"hfg.State, which {'changes' if name in before else 'appears'} while it runs and would be "
+                f"lost with its process: declare it as a state, as in {name} = hfg.State(0), or remove "
+                "ledger= from the group"
             )
 
 
@@ -517,11 +519,11 @@ def _codec(hint: Any) -> TokenCodec[Any] | None:
 
 
 def _refuse(reference: str) -> Any:
-    raise EncodingError(f'"{reference}" is code, and a ledger keeps none')
+    raise EncodingError(f'"{reference}" is code, and a ledger cannot store code')
 
 
 def _own(node: Node) -> dict[str, Any]:
-    """What the code of a node has written on it beside its state."""
+    """Return what the code of a node has written on it besides its state."""
     states = node._type.states
     before = node._written_before or frozenset()
     return {

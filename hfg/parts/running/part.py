@@ -1,8 +1,8 @@
-"""One part of a graph that is cut: an engine, and the tokens that leave it and come in (rules L1, L3, R5).
+"""One part of a graph that is cut: an engine, and the tokens that leave and enter it (rules L1, L3, R5).
 
-A part is a run like any other, but for its ends: what lies before an `Outlet` goes into a link, what comes out of one
-goes into an `Inlet`, and what it does when nothing moves is for the whole to say. It knows neither transports nor
-processes. Stands on the engine and `agreement`.
+A part is a run like any other, except for its ends: tokens before an `Outlet` go into a link, tokens from a link go
+into an `Inlet`, and the whole run decides what it does when nothing moves. It does not depend on transports or
+processes. Depends on the engine and `agreement`.
 """
 
 from __future__ import annotations
@@ -34,47 +34,47 @@ from hfg.ports.edges import EventEdge
 __all__ = ["Incoming", "Outgoing", "Part"]
 
 _LOGGER = Log("hfg.parts")
-_MOST_LOST: Final = 1_000_000  # of one edge at once; no part holds so many, so who says so is wrong
+_MOST_LOST: Final = 1_000_000  # of one edge at once; no part holds that many, so a higher number is wrong
 _MOST_SAID: Final = 1000  # words that wait for tokens which were sent before them
-_REST_S: Final = 0.002  # how long nothing has moved before that is said to others; in virtual time it is said at once
+_REST_S: Final = 0.002  # how long nothing must have moved before others are told; in virtual time they are told at once
 
 
 class Outgoing(Protocol):
-    """The link behind an edge that leaves the part."""
+    """The link of a leaving edge."""
 
     def room(self) -> int:
-        """How many tokens it would take now."""
+        """Return how many tokens it would take now."""
 
     def send(self, tokens: list[Token[Any]]) -> None:
         """Take tokens, oldest first, no more than there is room for."""
 
     def speaks(self, speaking: bool, total: int) -> None:
-        """Say that the producer is enabled from now on, or not, behind so many tokens."""
+        """Report that the producer is enabled from now on, or not, after so many tokens."""
 
     def begin_at(self, number: int) -> None:
-        """What leaves first has that number; nothing has left in this life."""
+        """The first token to leave has this number; nothing has left in this incarnation."""
 
     def goes_on(self, number: int) -> None:
-        """Say that what comes next is behind that number, of a part that has lived before."""
+        """Report that the next token comes after this number, for a part with previous incarnations."""
 
 
 class Incoming(Protocol):
     """The link before an edge that comes into it."""
 
     def taken(self, total: int) -> None:
-        """So many tokens were taken until now, and what came of them in this part is done."""
+        """So many tokens have been taken so far, and their consequences in this part are processed."""
 
     def hears(self, hearing: Hearing, total: int) -> None:
-        """What the consumer does with tokens from now on, when it has taken so many."""
+        """Report how the consumer handles tokens from now on, after it has taken so many."""
 
 
 class Part:
     """One part of a run.
 
     Attributes:
-      name: of its group.
-      composition: its engine, and what stands on that.
-      keeper: keeps what it does, if it has a ledger.
+      name: name of its group.
+      composition: its engine, with everything built on it.
+      keeper: stores its state, if it has a ledger.
       inherits: whether it has components whose tokens inherit positions.
     """
 
@@ -92,19 +92,19 @@ class Part:
         returns: bool = False,
         keeper: Keeper | None = None,
     ) -> None:
-        """Make it; nothing is set up yet.
+        """Make the part; nothing is set up yet.
 
         Args:
-          name: of its group.
-          composition: its engine, not begun yet, and what stands on that.
-          edges: those between it and other parts.
-          rests: told when nothing moves in it any more.
-          components: of its nodes.
+          name: name of its group.
+          composition: its engine, not started yet, with everything built on it.
+          edges: the edges between it and other parts.
+          rests: called when nothing moves in it any more.
+          components: components of its nodes.
           inherits: see above.
-          inherited: the edges between parts whose tokens inherit positions, by label.
-          remembered: those whose producer knows in each life what it has sent in others.
-          returns: it has lived before.
-          keeper: keeps what the part does, if it has a ledger.
+          inherited: labels of the edges between parts whose tokens inherit positions.
+          remembered: labels of the edges whose producer remembers the tokens of its previous incarnations.
+          returns: it has previous incarnations.
+          keeper: stores its state, if it has a ledger.
         """
         edges = list(edges)
         self.name = name
@@ -136,7 +136,7 @@ class Part:
         self._said: list[tuple[str, bool, int]] = []
         self._remembered = remembered
         self._gone: dict[str, int] = {}  # of edges into a ledger: how many were lost before it, and count as come
-        self._came_before: dict[str, int] = {}  # how many had come when the producer of an edge began anew
+        self._came_before: dict[str, int] = {}  # how many had arrived when the producer of an edge was restarted
         counted = remembered - inherited  # by a ledger, whose numbers may be those of a former run
         self._by_number = frozenset(
             edge.label
@@ -147,7 +147,7 @@ class Part:
             edge.label for edge in edges if is_synchronous(edge) and edge.label not in remembered
         )
         self._over: set[str] = set()  # edges on which END has come
-        # Edges from a ledger, whose numbers may be those of a former run: they count from where their consumer goes on.
+        # Edges from a ledger, whose numbers may be from a previous run: they count from where their consumer resumes.
         self._fresh: set[str] = set()
         self._producers = {edge.label: edge.source for edge in edges if edge.target == name}
         self._returns = returns and keeper is None
@@ -155,8 +155,8 @@ class Part:
         self._of: dict[str, Progress] = {
             label: one for one in self._progresses for label in (*one.coming, *one.leaving)
         }
-        self._start: dict[str, int] = {}  # of edges that come in, where a life that is not the first goes on
-        self._cleared: asyncio.Future[None] | None = None  # somebody waits until nothing is in it
+        self._start: dict[str, int] = {}  # where an incarnation other than the first resumes incoming edges
+        self._cleared: asyncio.Future[None] | None = None  # set while a caller waits until it is empty
         self._leaving = False
         engine.leave_quiet_to(self._nothing_moves)
         engine.callbacks.begun.append(self._begun)
@@ -164,7 +164,7 @@ class Part:
 
     @property
     def engine(self) -> Engine:
-        """What runs it."""
+        """Its engine."""
         return self.composition.engine
 
     def _look_whether_clear(self) -> None:
@@ -195,36 +195,36 @@ class Part:
             yield Progress((), {label: 0}, (), inherits=False, returns=self._returns)
 
     def positions(self, label: str) -> deque[Where] | None:
-        """Give the positions of what will be sent next over an edge, if they are inherited."""
+        """Return the positions of the next tokens of an edge, if they are inherited."""
         progress = self._of.get(label)
         return None if progress is None else progress.positions.get(label)
 
     def is_by_number(self, label: str) -> bool:
-        """Whether the n-th token of an edge that comes in has the number n, through all lives of its producer."""
+        """Return whether the n-th token of an incoming edge has the number n in all incarnations of its producer."""
         return label in self._by_number
 
     def is_aligned(self, label: str) -> bool:
-        """Whether it is known where this life goes on at that end of an edge."""
+        """Return whether it is known where this incarnation resumes at this end of an edge."""
         progress = self._of.get(label)
         return progress is None or progress.has_begun
 
     @asynccontextmanager
     async def emptied(self) -> AsyncIterator[None]:
-        """Inside the block nothing that came in is still in the part: its nodes and edges may be changed (R4).
+        """Inside the block, no incoming token is left in the part: its nodes and edges may be changed (R4).
 
-        A part whose tokens inherit positions knows what is done by counting; so it counts anew behind the block. Any
-        other needs none of this, and goes on meanwhile.
+        A part whose tokens inherit positions knows by counting what is processed, so it starts a new count after the
+        block. Other parts do not need this, and continue meanwhile.
 
         Raises:
-          UsageError: it is paused.
+          UsageError: the run is paused.
         """
         if not self.inherits:
             yield
             return
         if self.engine.core.held:
             raise UsageError(
-                f'group "{self.name}" is emptied of tokens before it is edited, so that none of them is lost when its '
-                "process dies; it is paused: run.resume() first"
+                f'group "{self.name}" is emptied of tokens before an edit, so that none is lost if its '
+                "process dies; but the run is paused: call run.resume() first"
             )
         self.engine.hold()
         for inlet in self.inlets.values():
@@ -248,12 +248,12 @@ class Part:
             self.engine.kick()
 
     def connect(self, outgoing: Mapping[str, Outgoing], incoming: Mapping[str, Incoming]) -> None:
-        """Give the links at its ends, by label of the edge."""
+        """Set the links at its ends, by label of the edge."""
         self._outgoing.update(outgoing)
         self._incoming.update(incoming)
 
     def begin(self) -> None:
-        """All parts are set up: go."""
+        """All parts are set up: start."""
         self.composition.lifetime.begin()
 
     def _begun(self) -> None:
@@ -264,7 +264,7 @@ class Part:
             self.engine.guard(inlet.lay)
 
     def be_kept(self, number: int) -> None:
-        """What was asked to be kept is kept: producers may hear of it, and what waited for it has left."""
+        """A request to the ledger is stored: producers may be told, and tokens that waited for it have left."""
         if self.keeper is not None and self.keeper.be_kept(number):
             self._is_at_rest = False
             self._settle_kept()
@@ -315,7 +315,7 @@ class Part:
         inlet.lay()
 
     def _in_order(self, label: str, inlet: Inlet, tokens: list[Arrived]) -> list[Arrived]:
-        """Give what is to be laid of them: the n-th that is laid has the number n."""
+        """Return the tokens to put on the edge: the n-th one has the number n."""
         if label in self._fresh or (label not in self._by_number and label not in self._start):
             return tokens
         following = inlet.received + 1
@@ -346,17 +346,18 @@ class Part:
         return laid
 
     def _silences(self, label: str, numbers: range, stream: int, stamp: float) -> list[Arrived]:
-        """What stands in place of tokens that are lost, so that those behind them meet what belongs to them."""
+        """Return silences in place of lost tokens, so that later tokens meet the tokens that belong to them."""
         if len(numbers) > _MOST_LOST:
             error = RunError(
-                f'edge "{label}" goes on with number {numbers.stop} behind {numbers.start - 1}: so many cannot be lost'
+                f'edge "{label}" continues with number {numbers.stop} after {numbers.start - 1}: so many '
+                "tokens cannot be lost"
             )
             self.finish("failed", error)
             return []
         return [((NO_MESSAGE, 0, stamp), (stream, number)) for number in numbers]
 
     def _say_lost(self, label: str, inlet: Inlet, count: int) -> None:
-        """Tokens of an edge are lost with a process: that is counted, said at once, and part of the report."""
+        """Tokens of an edge are lost with a process: count them, log it at once, and put it into the report."""
         inlet.count_lost(count)
         is_own = self._start.get(label, 0) > inlet.received  # the producer has sent them, and former lives lost them
         whose = self.name if is_own else self._producers[label]
@@ -380,7 +381,7 @@ class Part:
         for label in progress.leaving:
             self._leave_from(label, start, progress)
             if start > 1 and progress.source:
-                again = f'its source "{progress.source}" began again, and repeats up to {start - 1} tokens'
+                again = f'its source "{progress.source}" started over, and repeats up to {start - 1} tokens'
                 self._report(f'edge "{label}": {again}')
         for label in progress.coming:
             inlet = self.inlets[label]
@@ -394,7 +395,7 @@ class Part:
         self.send()
 
     def _leave_from(self, label: str, start: int, progress: Progress) -> None:
-        """What leaves goes on with that number; consumers that have less are told."""
+        """Resume leaving edges with this number; consumers that have fewer tokens are told."""
         outlet, link = self.outlets[label], self._outgoing[label]
         if not progress.inherits:
             link.begin_at(start)
@@ -403,7 +404,7 @@ class Part:
         link.goes_on(start - 1)
 
     def lose(self, label: str, total: int) -> None:
-        """Of so many tokens that have left for here, those that have not come are lost: the edge may lose some."""
+        """Count tokens as lost: those of `total` that were sent here and have not arrived. The edge may lose some."""
         self._is_at_rest = False
         inlet = self.inlets[label]
         inlet.lose(max(total - inlet.received, 0))
@@ -413,9 +414,9 @@ class Part:
         self.engine.kick()
 
     def be_taken(self, label: str, total: int) -> None:
-        """So many of the tokens that have left were taken until now."""
+        """So many of the tokens that have left have been taken so far."""
         if total <= self.outlets[label].taken:
-            return  # which was told in another way already, and moves nothing
+            return  # already known in another way, and changes nothing
         self._is_at_rest = False
         self.engine.at_once(partial(self._take, label, total))
 
@@ -424,19 +425,19 @@ class Part:
         self.send()
 
     def speak(self, label: str, speaking: bool, total: int) -> None:
-        """The producer of an edge that comes in was disabled or enabled, behind so many tokens.
+        """The producer of an incoming edge was disabled or enabled, after so many tokens.
 
         Raises:
-          Untrue: it says so of more and more tokens that do not come.
+          Untrue: it reports this for ever more tokens that do not arrive.
         """
         if sum(one == label for one, _, _ in self._said) >= _MOST_SAID:
-            raise Untrue(f'of edge "{label}" for the {_MOST_SAID}th time, behind tokens that do not come')
+            raise Untrue(f'of edge "{label}" for the {_MOST_SAID}th time, after tokens that do not arrive')
         self._is_at_rest = False
         self._said.append((label, speaking, total))
         self._listen()
 
     def _listen(self) -> None:
-        """What was said behind tokens holds when those are here."""
+        """Apply reports about a later position once its tokens are here."""
         waiting = []
         for label, speaking, total in self._said:
             if self._came(label) < total:
@@ -447,7 +448,7 @@ class Part:
         self._said = waiting
 
     def hear(self, label: str, hearing: Hearing, total: int) -> None:
-        """The consumer of an edge that leaves does otherwise with tokens, from when it has taken so many.
+        """The consumer of a leaving edge handles tokens differently, after it has taken so many.
 
         Raises:
           Untrue: so many have not left.
@@ -455,7 +456,7 @@ class Part:
         if total > self.outlets[label].sent:
             raise Untrue(f'that {total} tokens were taken from edge "{label}", by which fewer have left')
         self._is_at_rest = False
-        if not self._inherits(label):  # else it is taken when all that came of it is done
+        if not self._inherits(label):  # otherwise it counts as taken when all its consequences are processed
             self.outlets[label].be_taken(total)
         self.outlets[label].hear(hearing)
         self.send()
@@ -463,13 +464,13 @@ class Part:
     # --- other lives ------------------------------------------------------------------------------------------------
 
     def follow(self, label: str, total: int, *, is_known: bool, ended: bool) -> None:
-        """This life takes the place of others, of whose tokens on an edge that comes in so many were done.
+        """This incarnation takes the place of others, which have processed so many tokens of an incoming edge.
 
         Args:
-          label: of the edge.
+          label: label of the edge.
           total: how many.
-          is_known: the producer knows; else it will say where it goes on.
-          ended: behind those it has sent END, which is done as well, and of which a new life has to hear.
+          is_known: the producer knows the number; otherwise it will report where it resumes.
+          ended: after these it has sent END, which is processed as well, and which a new incarnation needs to know.
         """
         inlet, progress = self.inlets[label], self._of.get(label)
         inlet.heard = max(inlet.heard, total)
@@ -486,7 +487,7 @@ class Part:
         self.engine.at_once(partial(self._align, progress))
 
     def goes_on(self, label: str, number: int) -> None:
-        """A producer that has begun anew goes on behind that number: what is missing up to there is lost."""
+        """A restarted producer resumes after this number: missing tokens up to there are lost."""
         inlet, progress = self.inlets[label], self._of.get(label)
         inlet.heard = max(inlet.heard, number)
         if progress is not None and not progress.has_begun:
@@ -498,7 +499,10 @@ class Part:
             self._lose_before_ledger(label, number)
 
     def _lose_before_ledger(self, label: str, number: int) -> None:
-        """What is kept says what has come; so nothing takes the place of what has not, but both ends count it."""
+        """Count tokens lost before the ledger's position.
+
+        The ledger records what has arrived, so nothing takes their place, but both ends count them.
+        """
         inlet = self.inlets[label]
         lost = number - self._came_before.get(label, number)  # and not of now: what comes next may overtake the word
         if lost > 0:
@@ -512,7 +516,7 @@ class Part:
         return self.inlets[label].received + self._gone.get(label, 0)
 
     def _lose_up_to(self, label: str, number: int) -> None:
-        """All up to there is lost that has not come."""
+        """Count everything up to this number that has not arrived as lost."""
         self._is_at_rest = False
         inlet = self.inlets[label]
         silences = self._silences(label, range(inlet.received + 1, number + 1), 1, self.engine.now())
@@ -522,19 +526,19 @@ class Part:
             self.engine.kick()
 
     def is_over(self, label: str) -> bool:
-        """Whether END has come on an edge."""
+        """Return whether END has come on an edge."""
         return label in self._over
 
     def came(self, label: str) -> int | None:
-        """How many tokens have come on an edge, by the numbers of its producer; None: that was not told yet."""
+        """Return how many tokens have arrived on an edge, by the numbers of its producer; None: not known yet."""
         return self._came(label) if self.is_aligned(label) else None
 
     def begun_at(self, label: str) -> int:
-        """The number with which this life goes on on an edge."""
+        """Return the number with which this incarnation resumes an edge."""
         return self._start.get(label, 1)
 
     def precede(self, label: str, total: int | None, hearing: Hearing) -> None:
-        """This life takes the place of others, of whose tokens on an edge that leaves so many have come, if known."""
+        """This incarnation follows others, of whose tokens on a leaving edge `total` have arrived, if known."""
         self._is_at_rest = False
         outlet, progress = self.outlets[label], self._of.get(label)
         if progress is None or progress.inherits:
@@ -548,11 +552,11 @@ class Part:
         self.engine.kick()
 
     def consumer_returns(self, label: str) -> None:
-        """The consumer of an edge that leaves begins anew."""
+        """The consumer of a leaving edge is restarted."""
         self._is_at_rest = False
         outlet, progress = self.outlets[label], self._of.get(label)
         if progress is not None and not progress.inherits:
-            progress.alignment.came(label, 0)  # who would have told is gone
+            progress.alignment.came(label, 0)  # the part that would have reported it is gone
             self.engine.at_once(partial(self._align, progress))
         if outlet.hearing != "open":
             outlet.hear("open")
@@ -562,7 +566,10 @@ class Part:
         self.engine.kick()
 
     def producer_returns(self, label: str, *, remembers: bool) -> None:
-        """The producer of an edge that comes in begins anew; unless it remembers, nobody waits for what has come."""
+        """The producer of an incoming edge is restarted.
+
+        Unless it remembers, nothing waits for the tokens that have arrived.
+        """
         self._is_at_rest = False
         inlet, progress = self.inlets[label], self._of.get(label)
         self._came_before[label] = self._came(label)
@@ -571,7 +578,7 @@ class Part:
             progress.alignment.done(label, 0)
             self.engine.at_once(partial(self._align, progress))
         if progress is None or progress.has_begun:
-            inlet.heard = inlet.received  # which it is told, and goes on from there
+            inlet.heard = inlet.received  # it is told this, and resumes from there
         if not remembers:
             inlet.orphan()
         self._said = [said for said in self._said if said[0] != label]
@@ -596,7 +603,7 @@ class Part:
                     link.send(tokens)
 
     def _moved(self, inlet: Inlet) -> None:
-        """Tokens were taken: amid the pump that is told for several at once, and what is left at the end of it."""
+        """Tokens were taken: within the pump this is reported for several at once, and the rest at its end."""
         if self.keeper is not None:
             self._settle_kept()
         elif not self._inherits(inlet.label) and (
@@ -605,7 +612,7 @@ class Part:
             self._settle_at(inlet, inlet.taken)
 
     def _settle_at(self, inlet: Inlet, done: int) -> None:
-        """So many of its tokens are done: the producer hears of those that were not before."""
+        """So many of its tokens are processed: report the new ones to the producer."""
         if inlet.settle(done):
             self._incoming[inlet.label].taken(done)
 
@@ -614,13 +621,13 @@ class Part:
         return progress is not None and progress.inherits
 
     def _settle(self) -> None:
-        """What is done in components whose tokens inherit positions."""
+        """Report what is processed in components whose tokens inherit positions."""
         for progress in self._inheriting():
             for label, done in progress.done(self.engine.core, self.inlets, self.outlets).items():
                 self._settle_at(self.inlets[label], done)
 
     def _wake(self) -> None:
-        """Something lies before an outlet: it leaves when the engine is done with what it does now, see `_pumped`."""
+        """A token waits before an outlet: it leaves when the engine has finished its current work, see `_pumped`."""
         if not self._leaving and not self.engine.core.pumping:
             self._leaving = True
             self.engine.soon(self._leave)
@@ -631,7 +638,7 @@ class Part:
             self.send()
 
     def _pumped(self) -> None:
-        """A slice is over: what has gathered meanwhile leaves together."""
+        """An iteration is over: tokens that have gathered meanwhile leave together."""
         self._is_at_rest = False
         for label, inlet in self.inlets.items():
             hearing = inlet.hearing
@@ -664,7 +671,10 @@ class Part:
             self._look_later()
 
     def _look_later(self) -> None:
-        """A part that only waits for room rests again and again; to say so each time would cost as much as a token."""
+        """Delay the report of rest.
+
+        A part that only waits for room rests again and again, and each report would cost as much as a token.
+        """
         self._looks_later = True
         self.engine.loop.call_later(_REST_S, self._look, self._numbered)
 
@@ -688,16 +698,15 @@ class Part:
         )
 
     def _coming_account(self, label: str, inlet: Inlet) -> Account:
-        """By the numbers of the producer, which may be behind those that this side goes on with."""
+        """Return the account of an incoming edge by the producer's numbers, which may lag behind those of this side."""
         gone = self._gone.get(label, 0)
         heard = inlet.heard if label in self._of else inlet.received + gone
         return self._account(inlet, heard, min(inlet.settled + gone, heard))
 
     def _account(self, end: Outlet | Inlet, count: int, done: int) -> Account:
-        """Give what the two ends of an edge have to agree on.
+        """Return what the two ends of an edge have to agree on.
 
-        Of one whose consumer has ended all tokens are drained where they are; and nobody is told what becomes of those
-        that may be lost.
+        If the consumer has ended, all tokens are drained where they are; lossy tokens are not reported.
         """
         settled = (end.hearing == "over" and end.label in self._drains) or end.label in self._lossy
         return (count, count if settled else done, end.hearing, end.speaking)
@@ -750,7 +759,7 @@ class Part:
             if edge.label == label and isinstance(edge, EventEdge):
                 rings.grow_queue(self.engine.core, edge)
                 return
-        raise Untrue(f'that queue "{label}" is to grow, which is none here')
+        raise Untrue(f'that queue "{label}" should grow, which does not exist here')
 
     def _finish(self, reasons: list[str]) -> None:
         stalled = quiet.stalled(reasons) if reasons else None

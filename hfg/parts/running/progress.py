@@ -1,6 +1,6 @@
-"""How far one component of a part has come, in this life and those before it (rule L2).
+"""The progress of one component of a part, in this incarnation and previous ones (rule L2).
 
-Decides, never waits. Stands on the ends of edges in the engine and on `inheriting`.
+Decides, never waits. Depends on the ends of edges in the engine and on `inheriting`.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ class Progress:
     """One component of a part: a connected part of its synchronous edges.
 
     Attributes:
-      inherits: what it sends inherits the positions of what comes in, and a token that came in is done when all that
-        came of it is done; else it is done when it was taken.
-      source: a source in it, which each life begins from its start; "" if there is none.
+      inherits: its tokens inherit the positions of incoming ones, and an incoming token is processed when all its
+        consequences are; otherwise it is processed when it was taken.
+      source: a source in it, which starts over in each incarnation; "" if there is none.
       coming, leaving: its edges from and to other parts, by label.
-      alignment: where it goes on.
-      has_begun: it goes on from there.
-      positions: of what it will send next, by label of the edge, if it inherits them.
+      alignment: where it resumes.
+      has_begun: it has resumed from there.
+      positions: positions of the next tokens, by label of the edge, if it inherits them.
     """
 
     def __init__(
@@ -41,14 +41,14 @@ class Progress:
         returns: bool,
         source: str = "",
     ) -> None:
-        """Nothing has come yet.
+        """Start without tokens.
 
         Args:
           nodes: their paths.
-          coming: the edges that come in, by label, and how many initial values each has.
-          leaving: those that leave.
+          coming: labels of incoming edges, with the number of initial values of each.
+          leaving: labels of leaving edges.
           inherits: see above.
-          returns: the part has lived before.
+          returns: the part has previous incarnations.
           source: a source in it; "" if there is none.
         """
         self._nodes = frozenset(nodes)
@@ -66,7 +66,7 @@ class Progress:
         self._before: dict[Any, int] = {}  # what the ends had done when the part was edited last
 
     def look_for_last(self, core: Core) -> None:
-        """See who fires and sends nothing on; what stands for a subgraph never fires."""
+        """Find the nodes that fire and send nothing on; placeholders of subgraphs never fire."""
         self._last = [
             w
             for path, w in core.by_path.items()
@@ -74,7 +74,7 @@ class Progress:
         ]
 
     def begin_at(self, start: int) -> None:
-        """All before that number was done by former lives, or is lost with them."""
+        """Everything before this number was processed by previous incarnations, or is lost with them."""
         self.has_begun = True
         self._origin = dict.fromkeys(self.coming, start - 1)
 
@@ -86,7 +86,7 @@ class Progress:
         self._origin = {label: inlets[label].taken for label in self.coming}
 
     def inherit(self, label: str, tokens: list[Arrived], outlets: Mapping[str, Outlet]) -> None:
-        """What will be sent has the positions of what has come."""
+        """Tokens to be sent get the positions of tokens that have arrived."""
         ended = tokens[-1][0][0] is END
         inherited = self._inheritance.arrive(label, [where for _, where in tokens], ended=ended)
         for outlet, positions in self.positions.items():
@@ -94,10 +94,11 @@ class Progress:
                 positions.extend(inherited)
 
     def done(self, core: Core, inlets: Mapping[str, Inlet], outlets: Mapping[str, Outlet]) -> dict[str, int]:
-        """How many are done, by label of the edge that comes in.
+        """Return how many are done, by label of the edge that comes in.
 
-        Each token gives one everywhere: so many are done as have passed every end, and their firings are over. Who has
-        ended holds nobody up, once that is done which came before: whatever still comes is drained (F12).
+        Each token yields one everywhere. So the number of processed tokens is the number that has passed every end and
+        whose firings are over. A node that has ended does not count once earlier tokens are processed: later ones are
+        drained (F12).
         """
         before = self._before
         ends = [

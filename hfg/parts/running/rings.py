@@ -1,9 +1,9 @@
-"""Large arrays on edges between processes of one host: they lie in shared memory, and only leases travel.
+"""Large arrays on edges between processes of one host: they are in shared memory, and only leases are sent.
 
-The producer of an edge makes a ring when the first large array goes over it, and offers that to the consumer, which
-opens it and says so, or cannot, being on another host. Until then, and whenever no slot is free or large enough, arrays
-go the ordinary way. A slot is given back when the link is done with its token. Nothing here waits. Stands on
-`hfg.sharedmemory` and `messages`.
+The producer of an edge makes a ring when the first large array is sent over it, and offers the ring to the consumer.
+The consumer opens it and confirms, or cannot because it is on another host. Until then, and whenever no slot is free or
+large enough, arrays are sent as bytes. A slot is returned when the link has an acknowledgement for its token. Nothing
+here waits. Depends on `hfg.sharedmemory` and `messages`.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ _LOGGER = Log("hfg.parts")
 _REALM: Final = "run"
 _SMALLEST: Final = 2**16
 """Bytes of an array below which a copy costs less than a lease."""
-_SPARE: Final = 2  # slots beside those of the tokens under way: one is looked at, one is written to
+_SPARE: Final = 2  # slots in addition to those of tokens in transit: one is being read, one is being written
 _MOST_SLOTS: Final = 128
 _LARGEST: Final = 2**28
 """Bytes of a ring that are not exceeded for the sake of a long queue: what finds no slot there waits for one."""
 
 
 def segments_of(run: str) -> str:
-    """Give how the names of all shared memory of a run begin."""
+    """Return the common prefix of the names of all shared memory of a run."""
     return f"hfg-{_REALM}-{run.rpartition('/')[2]}-"
 
 
 def segment_of(run: str, life: int, edge: int) -> str:
-    """Give the name of the ring of an edge; each life of its producer has its own."""
+    """Return the name of the ring of an edge; each incarnation of its producer has its own."""
     return segment_name(_REALM, run.rpartition("/")[2], life, f"edge_{edge}")
 
 
@@ -75,9 +75,9 @@ class Lending:
     """The producer's side of an edge.
 
     Attributes:
-      ring: what large arrays lie in, once there was one.
-      is_answered: the consumer has said whether it can open what it was offered; until then each large array would have
-        to be copied, a whole window of them where that is long.
+      ring: the ring for large arrays, once there was one.
+      is_answered: the consumer has reported whether it can open the offered ring. Until then each large array has to be
+        copied, up to a whole window of them.
     """
 
     def __init__(
@@ -89,15 +89,15 @@ class Lending:
         unfinished: Callable[[], int],
         say: Callable[[Shares], None],
     ) -> None:
-        """Make nothing yet.
+        """Start without a ring.
 
         Args:
-          run: by which name all parts of the run know it.
-          segment: what the ring is to be called.
-          label: of the edge.
-          window: how many tokens may be under way.
-          unfinished: how many are, as the link knows it.
-          say: brings a message to the part of the consumer.
+          run: the name by which all parts know the run.
+          segment: name of the ring.
+          label: label of the edge.
+          window: how many tokens may be in transit.
+          unfinished: returns how many are in transit, according to the link.
+          say: sends a message to the part of the consumer.
         """
         self.ring: Ring | None = None
         self._run = run
@@ -113,7 +113,7 @@ class Lending:
         self.is_answered = True
         self._is_refused = unavailable() is not None
         self._early = 0
-        self._leases: deque[list[Lease]] = deque()  # of each token under way, oldest first
+        self._leases: deque[list[Lease]] = deque()  # of each token in transit, oldest first
         self._new: list[Lease] = []
 
     @property
@@ -124,22 +124,22 @@ class Lending:
 
     @property
     def room(self) -> int:
-        """How many more tokens may leave so that each that has a large array finds a slot that none under way has."""
+        """How many more tokens may leave so that each large array finds a slot that is not in transit."""
         return self._most - sum(map(bool, self._leases)) if self._is_seen else self._window
 
     def loan(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> np.ndarray[Any, Any] | None:
-        """Give an array of the ring to be filled; None if there is none, or no slot is free."""
+        """Return an array of the ring to fill; None if there is no ring, or no slot is free."""
         size = math.prod(shape) * dtype.itemsize
         if self._is_refused or size < _SMALLEST:
             return None
-        if self.ring is None and threading.get_ident() == self._thread:  # what it says to the consumer it says there
+        if self.ring is None and threading.get_ident() == self._thread:  # messages to the consumer are sent from there
             self._make(size)
         ring = self.ring
         if ring is None or size > ring.slot_size or array_problem(dtype) is not None:
             return None
         try:
             return ring.loan(shape, dtype)
-        except UsageError:  # closed at this very moment, for the run is over
+        except UsageError:  # closed at this very moment because the run is over
             return None
 
     def encode(self, codec: TokenCodec[Any], token: Token[Any]) -> tuple[bytes, bytes]:
@@ -153,7 +153,7 @@ class Lending:
             raise
 
     def sent(self) -> None:
-        """The link has the token, or has found that it needs none of it."""
+        """The link has accepted the token, or found that it is not needed."""
         if self.ring is None:
             return
         new, self._new = self._new, []
@@ -211,7 +211,7 @@ class Lending:
         self._say(Shares(self._label, self._segment, self._lane))
 
     def admit(self) -> None:
-        """The consumer has died and begins anew: what it held is free, and what is sent again it can open."""
+        """The consumer is restarted: slots that it held are free, and it can open resent arrays."""
         if self.ring is None or self._is_refused:
             return
         self.ring.dismiss(self._lane)
@@ -256,15 +256,15 @@ class Borrowing:
     """The consumer's side of an edge.
 
     Attributes:
-      is_awaited: a lease has come before the ring was offered: that is on its way.
+      is_awaited: a lease has arrived before the offer of its ring, which is in transit.
     """
 
     def __init__(self, run: str, say: Callable[[Sees], None]) -> None:
-        """Nothing was offered yet.
+        """Start without an offer.
 
         Args:
-          run: by which name all parts of the run know it.
-          say: brings a message to the part of the producer.
+          run: the name by which all parts know the run.
+          say: sends a message to the part of the producer.
         """
         self.is_awaited = False
         self._segments = segments_of(run)
@@ -285,10 +285,10 @@ class Borrowing:
         return segment.startswith(self._segments)
 
     def view(self, head: ArrayHead) -> np.ndarray[Any, Any]:
-        """Give the array of a lease.
+        """Return the array of a lease.
 
         Raises:
-          ValueError: there is none, or it is not known yet.
+          ValueError: there is no such array, or its ring is not known yet.
         """
         lease = head.lease
         if self._reader is None or lease is None or lease.segment != self._reader.segment:

@@ -1,9 +1,9 @@
-"""What somebody outside does with a run whose nodes are in several parts, and sees of it.
+"""Control and observation from outside of a run whose nodes are in several parts.
 
-run       what one can do with such a run
-asking    what is asked of other parts, from the side of the main one
-serving   and from the side of the part that is asked
-crossing  what is brought in and seen, as data
+run       the interface to such a run
+asking    requests to other parts, on the side of the main part
+serving   and on the side of the part that is asked
+crossing  values brought in and observed, as data
 """
 
 __all__: list[str] = []

@@ -1,10 +1,10 @@
-"""What somebody outside asks of the other parts of a run, from the side of the main one (rules P8, P10, R3, R7).
+"""Requests from outside to the other parts of a run, on the side of the main part (rules P8, P10, R3, R7).
 
-A question goes out as a `Call` and comes back as a `Result`. What goes on, such as a tap, has a `Call` that stands and
-`Seen` as long as it does. What stands, and what was set, is told to a part before its nodes are set up: whoever asks in
-`begin=` misses nothing, and a part that begins anew is as it was. What a part was asked when it died is asked again if
-it only looks or waits; else it fails, for nobody knows whether it was done. Knows where each node lives. Stands on
-`crossing`.
+A request is sent as a `Call` and answered with a `Result`. A continuing request, such as a tap, has a `Call` that stays
+open, and `Seen` messages for as long as it does. Open requests, and parameters that were set, are sent to a part before
+its nodes are set up: so requests in `begin=` miss nothing, and a restarted part is as it was. If a part dies during a
+request, the request is repeated if it only observes or waits; otherwise it fails because it is unknown whether it was
+executed. Depends on the places of nodes and on `crossing`.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from hfg.parts.steering.crossing import Crossing
 __all__ = ["Asking", "Homes", "Standing"]
 
 _LOGGER = Log("hfg.parts")
-_NOBODY: Final = 0  # the number of calls whose result nobody waits for
+_NOBODY: Final = 0  # the number of calls whose result is ignored
 _CHANGES_NOTHING: Final = ("wait_for", "wait_inputs", "wait_outputs", "wait_paused", "counts", "try_edit")
-"""What a part that begins anew is asked again: done twice it is as if done once."""
+"""Requests that are repeated to a restarted part: repeating them has no further effect."""
 
-_PARAMETER: Final = "parameter "  # the keys of what was set begin so
+_PARAMETER: Final = "parameter "  # prefix of the keys of parameters
 
 _GONE_WITH_THE_PART: Final = ("edit", "undo", "redo")
-"""What nobody has heard of when the part dies before it has answered."""
+"""Requests without any effect if the part dies before it has answered."""
 
 
 class Homes:
@@ -56,7 +56,7 @@ class Homes:
         self.draw(flat, cutting)
 
     def draw(self, flat: FlatGraph, cutting: Cutting) -> None:
-        """The graph is as it says here from now on."""
+        """From now on, the graph is as drawn here."""
         self.order = [node.path for one in flat.walk() for node in one.nodes]
         self._flat = flat
         self._nodes = [node.node for node in flat.nodes]
@@ -69,26 +69,26 @@ class Homes:
                     self._of_node[id(one.node)] = self._of_path[node.path]
 
     def has(self, node: Node) -> bool:
-        """Whether a node fires in some part; a subgraph does not."""
+        """Return whether a node fires in some part; a subgraph does not."""
         return id(node) in self._of_node
 
     def far_nodes(self) -> Iterator[Node]:
-        """Give those of other parts than the main one."""
+        """Return the nodes of parts other than the main one."""
         return (node for node in self._nodes if self.of_node(node) != MAIN)
 
     def of_path(self, path: str) -> str:
-        """Give the part of a node by its path; the main one where there is none."""
+        """Return the part of a node by its path; the main part if there is no such node."""
         return self._of_path.get(path, MAIN)
 
     def of_node(self, node: Any) -> str:
-        """Give the part of a node, or of a subgraph all of which is in one; the main one for whatever else."""
+        """Return the part of a node, or of a subgraph that is completely in one part; otherwise the main part."""
         if isinstance(node, Node) and id(node) not in self._of_node and node._place is not None:
             inside = {home for path, home in self._of_path.items() if path.startswith(f"{node.place.path}/")}
             return inside.pop() if len(inside) == 1 else MAIN
         return self._of_node.get(id(node), MAIN)
 
     def of_place(self, place: Any) -> set[str]:
-        """Give the parts in which something passes a port or an edge; that of its source, for an edge."""
+        """Return the parts in which tokens pass a port or an edge; for an edge, the part of its source."""
         if isinstance(place, Node):
             return {self.of_node(place)}
         kind = getattr(place, "kind", "")
@@ -116,18 +116,18 @@ class Homes:
         return self.of_node(graph_of(self._flat.graph)[path])
 
     def label_of(self, edge: DrawnEdge) -> str:
-        """Give the label of what an edge as drawn is in the run; "" if that is not one."""
+        """Return the label in the run of a drawn edge; "" if it does not have one."""
         labels = {one.label for flat in self._flat.walk() for one in flat.edges if edge in one.segments}
         return labels.pop() if len(labels) == 1 else ""
 
 
 class Standing:
-    """Something that goes on in other parts, until it is ended here.
+    """A continuing request to other parts, until it is ended here.
 
     Attributes:
-      number: of its calls.
-      parts: that were asked.
-      waits_for: the parts in which it goes on.
+      number: number of its calls.
+      parts: the parts that were asked.
+      waits_for: the parts in which it continues.
     """
 
     def __init__(
@@ -145,21 +145,21 @@ class Standing:
 
 
 class Asking:
-    """Asks the other parts, and hears what they answer.
+    """Sends requests to the other parts, and processes their answers.
 
     Attributes:
-      homes: where each node lives.
-      crossing: encodes what goes there and comes back.
+      homes: the part of each node.
+      crossing: encodes values in both directions.
       others: the names of the other parts.
     """
 
     def __init__(self, flat: FlatGraph, cutting: Cutting, say: Callable[[str, Call], None]) -> None:
-        """Ask nothing yet.
+        """Start without requests.
 
         Args:
           flat: the whole graph.
           cutting: of the same.
-          say: brings a call to a part.
+          say: sends a call to a part.
         """
         self.homes = Homes(flat, cutting)
         self.crossing = Crossing(flat)
@@ -171,7 +171,7 @@ class Asking:
         self._numbers = count(1)
         self._open: set[str] = set()
         self._over: set[str] = set()
-        self._kept: dict[tuple[str, str], Call] = {}  # what a part that begins is to be told, by part and key
+        self._kept: dict[tuple[str, str], Call] = {}  # calls for a part that starts, by part and key
         self._early: dict[str, list[Call]] = {}  # what was asked for before the part was there
         self._waiting: dict[int, tuple[str, Call, asyncio.Future[Any]]] = {}
         self._standing: dict[int, Standing] = {}
@@ -181,7 +181,7 @@ class Asking:
     # --- asking -----------------------------------------------------------------------------------------------------
 
     def ask(self, part: str, verb: str, **arguments: Any) -> asyncio.Future[Any]:
-        """Ask a part, and give what will hold its answer."""
+        """Send a request to a part. Return a future for its answer."""
         number = next(self._numbers)
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         call = Call(number, verb, arguments)
@@ -195,7 +195,7 @@ class Asking:
         self._send(part, Call(_NOBODY, verb, arguments))
 
     def keep(self, part: str, key: str, verb: str, **arguments: Any) -> None:
-        """Have a part do something, and have it done again if it begins anew."""
+        """Send a request to a part, and repeat it whenever the part is restarted."""
         call = Call(_NOBODY, verb, arguments)
         self._kept.pop((part, key), None)
         self._kept[part, key] = call
@@ -203,35 +203,35 @@ class Asking:
             self._say(part, call)
 
     def tell_if_there(self, part: str, verb: str, **arguments: Any) -> None:
-        """The same, unless the part is still to begin: then it learns in another way what it is to know."""
+        """Do the same, unless the part is still to start: then it learns this in another way."""
         if part in self._open:
             self._say(part, Call(_NOBODY, verb, arguments))
 
     def draw_again(self, flat: FlatGraph, cutting: Cutting) -> None:
-        """The graph was edited; what lies between the parts is the same as before."""
+        """The graph was edited; edges between the parts are unchanged."""
         self.homes.draw(flat, cutting)
         self.crossing.draw(flat)
         self.cutting = cutting
 
     def expect(self, answers: Mapping[str, Any]) -> None:
-        """Take nothing else for the answer of a verb than what is of its type."""
+        """Set the types of answers, by verb; others are refused."""
         self._answers.update(answers)
 
     def when_gone(self, then: Callable[[], None]) -> None:
-        """Have somebody called when a part has died."""
+        """Call a function when a part has died."""
         self._when_gone.append(then)
 
     def forget(self, part: str, key: str) -> None:
-        """A part that begins anew is not told this any more."""
+        """Do not repeat this to a restarted part any more."""
         self._kept.pop((part, key), None)
 
     def forget_parameters(self) -> None:
-        """A part that begins anew is sent the graph, and that has them."""
+        """Forget parameters: a restarted part is sent the graph, which has them."""
         for part, key in [one for one in self._kept if one[1].startswith(_PARAMETER)]:
             del self._kept[part, key]
 
     def keep_parameter(self, part: str, path: str, parcel: Parcel) -> None:
-        """Have a parameter set in a part, also in its next life."""
+        """Set a parameter in a part, including its later incarnations."""
         self.keep(part, f"{_PARAMETER}{path}", "set", path=path, parcel=parcel)
 
     def stand(
@@ -242,13 +242,13 @@ class Asking:
         ended: Callable[[], None] | None = None,
         **arguments: Any,
     ) -> Standing:
-        """Have something go on in some parts.
+        """Start a continuing request in some parts.
 
         Args:
-          parts: in which.
-          verb: what; it takes the number as `number`.
-          seen: called with the name of the part and what has come by.
-          ended: called when nothing more will come, for all these parts are over.
+          parts: the parts.
+          verb: the request; it takes the number as `number`.
+          seen: called with the name of the part and its observations.
+          ended: called when all these parts are over.
           **arguments: of the verb.
         """
         standing = Standing(next(self._numbers), parts, seen, ended)
@@ -262,7 +262,7 @@ class Asking:
         return standing
 
     def end(self, standing: Standing) -> None:
-        """It goes on no more. Does nothing the second time."""
+        """End a continuing request. A second call does nothing."""
         if self._standing.pop(standing.number, None) is not None:
             for part in standing.waits_for:
                 self.forget(part, f"standing {standing.number}")
@@ -277,16 +277,16 @@ class Asking:
     # --- hearing ----------------------------------------------------------------------------------------------------
 
     def open(self, part: str) -> list[Call]:
-        """A part begins: give what it is to do before its nodes are set up."""
+        """A part starts: return the calls to make before its nodes are set up."""
         self._open.add(part)
         kept = [call for (name, _), call in self._kept.items() if name == part]
         return kept + self._early.pop(part, [])
 
     def hear(self, part: str, message: Result | Seen) -> None:
-        """A part has answered, or something has come by there.
+        """Process an answer or an observation of a part.
 
         Raises:
-          Untrue: it was not asked, or what it says cannot be read.
+          Untrue: it was not asked, or its message cannot be read.
         """
         if isinstance(message, Seen):
             standing = self._standing.get(message.number)
@@ -318,11 +318,11 @@ class Asking:
         try:
             future.set_result(msgspec.convert(value, self._answers.get(call.verb, Any)))
         except msgspec.ValidationError as error:
-            future.set_exception(RunError(f"{_named(call)} was answered with what is no answer: {error}"))
-            raise Untrue(f"which is no answer to {_named(call)}: {error}") from error
+            future.set_exception(RunError(f"the answer to {_named(call)} is not valid: {error}"))
+            raise Untrue(f"which is not an answer to {_named(call)}: {error}") from error
 
     def gone(self, part: str, error: HfgError) -> None:
-        """A part answers no more; whether it begins anew is for others to say."""
+        """A part no longer answers; whether it is restarted is decided elsewhere."""
         was_open = part in self._open
         self._open.discard(part)
         for then in self._when_gone:
@@ -336,9 +336,9 @@ class Asking:
                 continue
             what = f"{_named(call)} may have been done or not: look, and ask again"
             if call.verb in _GONE_WITH_THE_PART:
-                what = f"the {call.verb} was not made, for the next one begins with the graph as it was"
+                what = f"the {call.verb} was not made because the next incarnation starts with the graph as it was"
             future.set_exception(RunError(f"{error}; {what}"))
-            future.exception()  # it may be that nobody waits for it any more
+            future.exception()  # possibly nothing awaits it any more
 
     def over(self, part: str) -> None:
         """The run is over in a part."""

@@ -1,8 +1,8 @@
-"""What somebody outside brings into another part of a run, and what he sees of it, as data (rules L4, R7, P10).
+"""Values brought into another part of a run from outside, and values observed there, as data (rules L4, R7, P10).
 
-Both sides have the whole graph, so both know of each port, edge and parameter what values pass there, and encode them
-as links do. What is brought in is exact, or refused. What is only looked at never fails: where a value cannot be
-encoded its text is shown. Stands on `messages`.
+Both sides have the whole graph, so both know the types of each port, edge and parameter, and encode values as links do.
+Values that are brought in are exact, or refused. Observed values never fail: if a value cannot be encoded, its text is
+shown. Depends on `messages`.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Crossing:
         self.draw(flat)
 
     def draw(self, flat: FlatGraph) -> None:
-        """The graph is as it says here from now on."""
+        """From now on, the graph is as drawn here."""
         self._graph: Graph = graph_of(flat.graph)
         self._ports: dict[str, Port] = {}
         for one in flat.walk():
@@ -63,10 +63,10 @@ class Crossing:
     # --- exactly ----------------------------------------------------------------------------------------------------
 
     def codec(self, path: str, hint: Any) -> TokenCodec[Any]:
-        """Give what encodes the values of a port.
+        """Return the codec for the values of a port.
 
         Raises:
-          EncodingError: they cannot cross.
+          EncodingError: they cannot be sent to another process.
         """
         try:
             return codec_of(self._port(path), hint, f'the value of "{path}"')
@@ -84,10 +84,10 @@ class Crossing:
         return Parcel(*self.codec(path, hint).encode(token))
 
     def unpack(self, path: str, hint: Any, parcel: Any) -> Token[Any]:
-        """Give the token back.
+        """Return the token in a parcel.
 
         Raises:
-          EncodingError: it is none.
+          EncodingError: it is not a token.
         """
         parcel = msgspec.convert(parcel, Parcel)
         return self.codec(path, hint).decode(parcel.metadata, parcel.value)
@@ -109,7 +109,7 @@ class Crossing:
         return Parcel(*bare, shown=text(token.value))
 
     def see(self, place: str, parcel: Parcel) -> Token[Any]:
-        """Give the token back, or one with the text of its value."""
+        """Return the token, or one with the text of its value."""
         shown, value = parcel.shown, parcel.value
         if shown is None:
             codec = self._codec_at(place)
@@ -138,7 +138,7 @@ class Crossing:
         return event  # type: ignore[return-value]  # all others are plain
 
     def see_event(self, sight: PlainEvent | Passed) -> TraceEvent:
-        """Give the event back."""
+        """Return the event."""
         if not isinstance(sight, Passed):
             return sight
         place = f"{sight.place}.{sight.detail}" if sight.kind == "set" else sight.place
@@ -162,10 +162,10 @@ class Crossing:
         return self._codecs[place]
 
     def _port(self, place: str) -> Port:
-        """Give the port by which it comes there; for an edge that is not drawn, that behind the arrow of its label."""
+        """Return the port of a token; for an edge that is not drawn, the one after the arrow of its label."""
         if place in self._ports:
             return self._ports[place]
         port = self._graph[place.rpartition(" -> ")[2]]
         if not isinstance(port, Port):
-            raise EncodingError(f'"{place:.200}" is no port: no token passes there')
+            raise EncodingError(f'"{place:.200}" is not a port: no token passes there')
         return port

@@ -1,8 +1,8 @@
-"""Edits of a run whose graph is cut (rules L1, R4): each takes effect in the one part it concerns; then all draw it.
+"""Edits of a run whose graph is cut: each takes effect in the one part it concerns; then all parts draw it.
 
-Every part has the whole graph as a drawing, of which it runs its nodes. So an edit is done where it concerns something
-that runs, by that part's own engine, and if that went well the others carry it out on their drawings. A part that
-begins anew is sent the drawing as it is by then. Stands on `asking`.
+Every part has the whole graph as a drawing, of which it runs its own nodes. So an edit is made by the engine of the
+part whose nodes it concerns, and if it succeeds, the others apply it to their drawings (rules L1, R4). A restarted part
+is sent the current drawing. Depends on `asking`.
 """
 
 from __future__ import annotations
@@ -34,22 +34,22 @@ _ENDED: Final = "the run ended before the edit was made"
 
 
 class Drawing:
-    """The whole graph as all parts know it by now.
+    """The whole graph as all parts currently know it.
 
     Attributes:
       flat: the graph.
       cutting: of the same.
-      text: the same as a graph file; what a part that begins is sent.
+      text: the same as a graph file, for parts that start.
     """
 
     def __init__(self, flat: FlatGraph, cutting: Cutting, text: str, write: Callable[[Graph], str]) -> None:
-        """Begin with what runs.
+        """Start with the running graph.
 
         Args:
           flat: the graph.
           cutting: of the same.
           text: of the same.
-          write: gives the text of a graph.
+          write: returns the text of a graph.
         """
         self.flat = flat
         self.cutting = cutting
@@ -69,10 +69,10 @@ class CutEdits:
 
     Args:
       graph: the whole.
-      edits: of the main part.
-      asking: asks the others.
-      drawing: what is known of the whole.
-      answer: asks a part and waits for what it says, or for the end of the run.
+      edits: edits of the main part.
+      asking: sends requests to the others.
+      drawing: the drawing of the whole.
+      answer: sends a request to a part and waits for its answer, or for the end of the run.
     """
 
     def __init__(self, graph: Graph, edits: Edits, asking: Asking, drawing: Drawing, answer: Answer) -> None:
@@ -91,7 +91,7 @@ class CutEdits:
             said = encode(commands)
             where = self._concern(prepare(self._graph, commands, check=False).changes)
             for part in self._asking.others:
-                if part != where.part:  # which does it, and says by that whether it can
+                if part != where.part:  # that part makes the edit, and reports whether it can
                     await self._answer(part, _ENDED, "try_edit", commands=said)
             now, drawn = partial(self._edits.edit_now, commands), partial(draw, self._graph, commands)
             gone = await self._carry_out(where, "edit", now, drawn, commands=said)
@@ -118,8 +118,8 @@ class CutEdits:
     def _need_known(self, verb: str, transaction: Transaction) -> Transaction:
         if transaction not in self._known:
             raise UsageError(
-                f"cannot {verb} this: it was edited before the run began, or before one of its processes did, which "
-                "therefore does not know it; edit the graph as you want it"
+                f"cannot {verb} this: the edit was made before the run started, or before one of its "
+                "processes did, which therefore does not know it; edit the graph as you want it"
             )
         return transaction
 
@@ -134,7 +134,7 @@ class CutEdits:
             try:
                 self._drawing.write(self._graph)
             except FileError as error:
-                raise UsageError(f"the edit cannot be told to the other processes of the run: {error}") from None
+                raise UsageError(f"the edit cannot be sent to the other processes of the run: {error}") from None
         finally:
             undo_all(changes)
         return found
@@ -147,7 +147,7 @@ class CutEdits:
         drawn: Callable[[], None],
         **arguments: Any,
     ) -> list[Worker]:
-        """Do it where it concerns something, then have all others draw it; give who is to be torn down here."""
+        """Make the edit where it takes effect, then have all others draw it. Return the nodes to tear down here."""
         history = history_of(self._graph)
         before = history.done[-1:], history.undone[-1:]
         try:
@@ -157,20 +157,20 @@ class CutEdits:
             return []
         finally:
             took_effect = (history.done[-1:], history.undone[-1:]) != before
-            if took_effect:  # also if this is cancelled, or fails, behind it
+            if took_effect:  # even if it is cancelled, or fails, afterwards
                 if verb == "edit":
                     self._known.append(history.done[-1])
                 self._asking.forget_parameters()  # the drawing has them, as they are by now
                 self._drawing.again()
                 self._asking.draw_again(self._drawing.flat, self._drawing.cutting)
                 for part in self._asking.others:
-                    if part != where.part:  # one that begins just now is sent the whole as it is
+                    if part != where.part:  # a part that starts just now is sent the current drawing
                         self._asking.tell_if_there(part, f"draw_{verb}", **arguments)
 
     async def _there(self, part: str, verb: str, *, drawn: Callable[[], None], **arguments: Any) -> None:
-        """Have a part do it, and draw it here when that is done.
+        """Have a part make the edit, then draw it here.
 
-        What another process does cannot be called off, so who is cancelled meanwhile waits for its end.
+        An edit in another process cannot be cancelled; a cancelled caller waits for its result.
         """
         asked = asyncio.ensure_future(self._answer(part, _ENDED, verb, **arguments))
         cancelled: asyncio.CancelledError | None = None
@@ -186,12 +186,12 @@ class CutEdits:
 
 
 def _refuse_copies(commands: Sequence[Command]) -> None:
-    """A copy has the values that parameters have at work, which may be others than those drawn here (P8)."""
+    """Refuse to copy nodes elsewhere: the current values of their parameters may differ from those drawn here (P8)."""
     for command in commands:
         if isinstance(command, Copy):
             raise UsageError(
-                f'"{command.path}" may be at work in another process with values that are not drawn here, so it cannot '
-                "be copied while the graph runs in several: Add a node of the same type"
+                f'"{command.path}" may have parameter values in another process that are not drawn here, so '
+                "it cannot be copied while the graph runs in several: Add a node of the same type"
             )
 
 
@@ -206,7 +206,7 @@ def try_to_draw(graph: Graph, commands: Sequence[Command]) -> None:
 
 
 def draw_undo(graph: Graph) -> None:
-    """Take back on a drawing what was taken back elsewhere."""
+    """Undo on a drawing what was undone elsewhere."""
     history = history_of(graph)
     undo_all(history.next_undo().changes)
     history.undo_done()

@@ -1,8 +1,8 @@
-"""The run of a graph whose nodes are in several processes: one can do with it what one can do with any (rule L1).
+"""The run of a graph whose nodes are in several processes; it has the same interface as any run (rule L1).
 
-What concerns a node is done where it lives. What is read at once, such as statistics, is of now for the main part and
-of when they last said so for the others: asking makes them say it again, and `refresh` waits for that. Stands on
-`asking` and `editing`.
+Requests about a node are executed in its process. Values that are read at once, such as statistics, are current for the
+main part and as of the last report for the others: reading them requests new ones, and `refresh` waits for these.
+Depends on `asking` and `editing`.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ _NO_STATISTICS: Final = EdgeStatistics(0, 0.0, 0, 0, 0, 0, None, 0)
 
 
 class Counts(msgspec.Struct, frozen=True):
-    """What a part has said of itself last.
+    """The last report of a part about itself.
 
     Attributes:
       nodes, edges, errors, lost_activity: as in `Report`.
-      glance, statistics: if they were asked for.
-      clock_within_s: by how much its clock differs from the run's at most.
-      at: when it was said, on the clock of the main part.
+      glance, statistics: if they were requested.
+      clock_within_s: maximum difference of its clock from the run's.
+      at: time of the report, on the clock of the main part.
     """
 
     nodes: dict[str, NodeReport]
@@ -103,7 +103,7 @@ class CutRun(Run):
             stamp = value.stamp if stamp is None else stamp
             value = value.value
         parcel = self._asking.crossing.pack(port.path, port.type, Token(value))
-        self._engine.hold()  # what is on its way can still bring the graph to life
+        self._engine.hold()  # tokens in transit can still revive the graph
         try:
             await self._answer(
                 home,
@@ -118,7 +118,7 @@ class CutRun(Run):
             self._engine.unhold()
 
     def _set(self, parameter: ParameterPort[Any], value: object) -> None:
-        """What this side can refuse is refused before anything is set anywhere."""
+        """Refuse invalid values on this side before anything is set anywhere."""
         reached = need_settable(self._engine, parameter, value)
         homes = {one: self._homes.of_node(one.node) for one in reached}
         far = {one: home for one, home in homes.items() if home != MAIN}
@@ -148,7 +148,7 @@ class CutRun(Run):
             self._asking.tell(home, "wake", node=found.place.path)
 
     def reset_activity(self) -> None:
-        """See `Run.reset_activity`; each part does so when it hears of it."""
+        """See `Run.reset_activity`; each part does so when it receives the request."""
         super().reset_activity()
         for part in self._asking.others:
             self._asking.tell(part, "reset_activity")
@@ -191,7 +191,7 @@ class CutRun(Run):
     # --- holding it still -------------------------------------------------------------------------------------------
 
     def pause(self) -> None:
-        """See `Run.pause`; each part does so when it hears of it, and `wait_paused` waits for all."""
+        """See `Run.pause`; each part does so when it receives the request, and `wait_paused` waits for all."""
         super().pause()
         self._pause_others()
 
@@ -203,7 +203,7 @@ class CutRun(Run):
     def resume(self) -> None:
         """See `Run.resume`."""
         if self._far_step:
-            raise UsageError("a step is under way: await it before run.resume()")
+            raise UsageError("a step is in progress: await it before run.resume()")
         was_paused = self.paused
         super().resume()
         for part in self._asking.others if was_paused else ():
@@ -223,7 +223,7 @@ class CutRun(Run):
         found: Node | None = None if node is None else self._at(node)
         what = "a wave" if found is None else found.place.path
         if self._far_step:
-            raise UsageError(f"{what} cannot step while another step is under way: await that first")
+            raise UsageError(f"{what} cannot step while another step is in progress: await that first")
         home = MAIN if found is None else self._homes.of_node(found)
         if found is not None and home == MAIN:
             return await super().step(found)
@@ -265,7 +265,7 @@ class CutRun(Run):
             )
         if MAIN in parts:
             raise UsageError(
-                f'"{path}" stands for places in several processes: set a breakpoint at the ports of the nodes inside'
+                f'"{path}" represents places in several processes: set a breakpoint at the ports of the inner nodes'
             )
         point = Breakpoint(what, path, self._remove)
 
@@ -299,7 +299,7 @@ class CutRun(Run):
 
         def seen(part: str, told: Seen) -> None:
             before = counted.get(part, 0)
-            counted[part] = max(told.count, before)  # a part that has begun anew counts anew
+            counted[part] = max(told.count, before)  # a restarted part starts its count over
             buffer.miss(max(told.count - before - len(told.tokens), 0))
             for parcel in told.tokens:
                 buffer.put(crossing.see(path, parcel))
@@ -363,7 +363,7 @@ class CutRun(Run):
                 self._take_counts(part, told)
 
     def active(self) -> list[str]:
-        """See `Run.active`; of other parts as they last said (see `refresh`)."""
+        """See `Run.active`; for other parts as of their last report (see `refresh`)."""
         self._ask_counts("glance")
         found = set(super().active())
         for counts in self._counts.values():
@@ -371,7 +371,7 @@ class CutRun(Run):
         return [path for path in self._homes.order if path in found]
 
     def glance(self) -> Glance:
-        """See `Run.glance`; of other parts as they last said (see `refresh`)."""
+        """See `Run.glance`; for other parts as of their last report (see `refresh`)."""
         self._ask_counts("glance")
         mine = super().glance()
         nodes = {node.path: node for node in mine.nodes}
@@ -387,7 +387,7 @@ class CutRun(Run):
         return msgspec.structs.replace(mine, nodes=list(self._in_order(nodes).values()), lost=lost, growing=growing)
 
     def statistics(self) -> Statistics:
-        """See `Run.statistics`; of other parts as they last said (see `refresh`), with the age of that."""
+        """See `Run.statistics`; for other parts as of their last report (see `refresh`), with its age."""
         self._ask_counts("statistics")
         mine = super().statistics()
         said = {part: counts.statistics for part, counts in self._counts.items() if counts.statistics is not None}
@@ -410,7 +410,7 @@ class CutRun(Run):
         )
 
     def counts(self) -> Mapping[str, Counts]:
-        """Give what the other parts have last said, and ask them again; for reports of a run that goes on."""
+        """Return the last reports of the other parts, and request new ones; for reports of a run in progress."""
         self._ask_counts()
         return self._counts
 
@@ -418,7 +418,7 @@ class CutRun(Run):
         self._wanted += [one for one in what if one not in self._wanted]
 
     def _ask_counts(self, *what: str) -> None:
-        """See to it that whoever looks again sees newer ones; a part that has not answered yet is not asked again."""
+        """Request new reports; a part that has not answered yet is not asked again."""
         self._want(*what)
         if self._engine.core.over:
             return
@@ -433,7 +433,7 @@ class CutRun(Run):
             self._take_counts(part, asked.result())
 
     def _take_counts(self, part: str, told: Counts) -> None:
-        """What it says of others is for those to say."""
+        """Accept a report, except items that belong to other parts."""
         homes, glance, statistics = self._homes, told.glance, told.statistics
         labels = {edge.label for flat in self._asking.cutting.parts[part].walk() for edge in flat.edges}
 
@@ -467,10 +467,10 @@ class CutRun(Run):
     async def edit(self, *commands: Command) -> None:
         """See `Run.edit`. An edit is made in one process: it concerns nodes of one, and edges between them.
 
-        Where another process than the main one is concerned, who is cancelled meanwhile waits until that has answered.
+        An edit in another process cannot be cancelled; a cancelled caller waits for its result.
 
         Raises:
-          UsageError: also if it concerns nodes of several processes, or an edge from one to another.
+          UsageError: including: it concerns nodes of several processes, or an edge from one to another.
         """
         self._need_running("edit the graph with graph.edit(...)")
         await self._cut_edits.edit(commands)
@@ -486,7 +486,7 @@ class CutRun(Run):
         await self._cut_edits.redo()
 
     async def reload(self, module: str | ModuleType) -> None:
-        """Refuse it: code is changed in all processes at once, or in none."""
+        """Refuse to reload: code is changed in all processes at once, or in none."""
         self._refuse("given new code")
 
     def _need_here(self, chosen: Callable[[str], bool]) -> None:
@@ -519,7 +519,7 @@ class CutRun(Run):
     # --- where things are -------------------------------------------------------------------------------------------
 
     def _find(self, what: Any) -> tuple[str, Any, set[str]]:
-        """Give by which path or label other parts know a place, the place, and in which parts that is."""
+        """Return the path or label of a place for other parts, the place, and the parts that have it."""
         homes = self._homes
         if isinstance(what, Edge):
             label = homes.label_of(what)
@@ -535,7 +535,7 @@ class CutRun(Run):
 
 
 def _joined(edge: CutEdge, halves: Mapping[str, Mapping[str, EdgeStatistics]]) -> EdgeStatistics:
-    """What an edge has carried, of which each side knows a half."""
+    """Return the counts of an edge, of which each side has one half."""
     source = halves.get(edge.source, {}).get(edge.label, _NO_STATISTICS)
     target = halves.get(edge.target, {}).get(edge.label, _NO_STATISTICS)
     return msgspec.structs.replace(

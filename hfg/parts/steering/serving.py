@@ -1,7 +1,6 @@
-"""What somebody outside asks of this part of a run, from its own side: the verbs of `Call` (rules P8, P10, R3, R7).
+"""Requests from outside to this part of a run, on its own side: the verbs of `Call` (rules P8, P10, R3, R7).
 
-A part has a `Run` like any other, so there is nothing here but what becomes of arguments and answers on their way.
-Stands on `crossing`.
+A part has a `Run` like any other, so this module only converts arguments and answers. Depends on `crossing`.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from hfg.trace import RunEnded, RunPaused, RunResumed, RunStarted, TraceEvent
 __all__ = ["Serving"]
 
 _MOST: Final = 500  # events in one message
-_OF_THE_WHOLE: Final = (RunStarted, RunEnded, RunPaused, RunResumed)  # what the main part tells for all
+_OF_THE_WHOLE: Final = (RunStarted, RunEnded, RunPaused, RunResumed)  # events that the main part reports for all parts
 
 
 class Serving:
@@ -51,14 +50,14 @@ class Serving:
         say: Callable[[Message], None],
         emptied: Callable[[], AbstractAsyncContextManager[None]],
     ) -> None:
-        """Serve a part of which nothing is set up yet.
+        """Serve a part that is not set up yet.
 
         Args:
-          graph: the whole one, as it is here.
-          flat: the same.
+          graph: the whole graph, as it is here.
+          flat: the same, flattened.
           composition: of the part.
-          say: answers.
-          emptied: around what changes the nodes of the part.
+          say: sends answers.
+          emptied: context for changes of the part's nodes.
         """
         self._graph = graph
         self._emptied = emptied
@@ -104,7 +103,7 @@ class Serving:
         """Do what is asked, and answer when it is done."""
         try:
             if call.verb not in self._verbs:
-                raise EngineInternalError(f'"{call.verb}" was asked of a part, which does not know it')
+                raise EngineInternalError(f'"{call.verb}" was sent to a part, which does not know it')
             answer = self._verbs[call.verb](**call.arguments)
         except Exception as error:
             self._answer(call, failed=_failed(error))
@@ -132,7 +131,7 @@ class Serving:
             watching.flush()
 
     def close(self) -> None:
-        """The part is torn down: nobody is answered any more."""
+        """The part is torn down: send no more answers."""
         self.flush()
         for task in self._tasks:
             task.cancel()
@@ -151,7 +150,7 @@ class Serving:
     # --- editing ----------------------------------------------------------------------------------------------------
 
     async def _edit(self, now: Callable[[], Awaitable[list[Worker]]], empties: bool) -> None:
-        """Do it, and answer as soon as it holds: those who are gone are torn down behind that."""
+        """Make the edit, and answer as soon as it is in effect; removed nodes are torn down afterwards."""
         edits = self._composition.edits
         async with edits.turns.one(), self._emptied() if empties else nullcontext():
             gone = await now()
@@ -161,7 +160,7 @@ class Serving:
         leaving.add_done_callback(self._tasks.discard)
 
     def _draw(self, drawn: Callable[[], None]) -> None:
-        """What was edited in another part."""
+        """Draw an edit of another part."""
         drawn()
         self._crossing.draw(flatten(self._graph))
 
@@ -229,13 +228,13 @@ def _failed(error: Exception) -> Failed:
 
 
 class _Watching:
-    """Something that somebody outside looks at."""
+    """An observation from outside."""
 
     def __init__(self) -> None:
         self._end: Callable[[], object] = lambda: None
 
     def begun(self, end: Callable[[], object]) -> None:
-        """It goes on, until that is called."""
+        """It continues until `end` is called."""
         self._end = end
 
     def leave(self) -> None:
@@ -247,7 +246,7 @@ class _Watching:
 
 
 class _Batches(_Watching):
-    """What comes by within one pass of the loop goes out together."""
+    """Observations of one iteration of the loop are sent together."""
 
     def __init__(self, number: int, crossing: Crossing, say: Callable[[Message], None]) -> None:
         super().__init__()
@@ -309,11 +308,11 @@ class _Tapping(_Batches):
         self.due()
 
     def end(self) -> None:
-        """No more will pass; that the run is over is told by itself."""
+        """Stop; the end of the run is reported separately."""
         self._may_say = True
 
     def go_on(self) -> None:
-        """What was said has been taken over there."""
+        """The receiver has processed the last batch."""
         self._may_say = True
         self.flush()
 
