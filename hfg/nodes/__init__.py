@@ -1,13 +1,12 @@
 """The standard library of nodes: one family a module, written on floors 0-3 as a user would write it.
 
-    import hfg
-    from hfg.nodes import flow
+    import hfg from hfg.nodes import flow
 
     graph.add(flow.delay(seconds=0.5))
 
-Nothing is imported before it is asked for, so `import hfg.nodes` is cheap; families that stand on other packages
-(OpenCV, matplotlib) say which extra is missing when they are used. `hfg nodes` lists what there is, `docs/nodes`
-describes it. `from_module` makes node types of the functions of any module.
+Everything is imported on first use, so `import hfg.nodes` is cheap; families that depend on other packages (OpenCV,
+matplotlib) say which extra is missing when they are used. `hfg nodes` lists what there is, `docs/nodes` describes it.
+`from_module` makes node types of the functions of any module.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""One timer of a node: set anew it begins anew, cancelled it holds nothing up. Stands on the clock and nodetype."""
+"""One timer of a node: setting it again restarts it, and once cancelled it delays nothing.
+
+Depends on the clock and nodetype.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +36,7 @@ class Alarm:
         self._sleeping: asyncio.Future[None] | None = None
 
     def set(self, seconds: float) -> None:
-        """Ring in so many seconds from now on, and not when it was to ring before."""
+        """Ring `seconds` from now, instead of at the time set before."""
         self.set_at(elapsed() + seconds)
 
     def set_at(self, due: float) -> None:

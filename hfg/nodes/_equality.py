@@ -1,4 +1,4 @@
-"""Whether two values are the same, for nodes that take values of any type. Stands on nothing."""
+"""Whether two values are the same, for nodes that take values of any type. Depends on nothing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["same"]
 
 
 def same(a: Any, b: Any) -> bool:
-    """Say whether two values are equal, also where `==` gives an array or raises."""
+    """Return whether two values are equal, even if `==` gives an array or raises."""
     try:
         answer = a == b
         return bool(answer.all() and a.shape == b.shape) if hasattr(answer, "all") else bool(answer)

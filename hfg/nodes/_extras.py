@@ -1,4 +1,4 @@
-"""Packages that only some families need: what is missing is told in one sentence."""
+"""Packages that only some families need: a missing one is reported in one message."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def require(module: str, extra: str) -> Any:
       extra: the extra that installs it: "vision".
 
     Raises:
-      ModuleNotFoundError: it is not installed; the sentence says who needs it and what to install.
+      ModuleNotFoundError: it is not installed; the message says who needs it and what to install.
     """
     try:
         return importlib.import_module(module)

@@ -26,7 +26,7 @@ __all__ = ["Port", "Recipe", "Setting", "holds_reals", "make", "port_name"]
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """An input or an output; `optional` inputs are given None if nobody connects them."""
+    """An input or an output; `optional` inputs get None if they are not connected."""
 
     name: str
     hint: Any
@@ -131,7 +131,7 @@ def _section(title: str, entries: list[tuple[str, str]]) -> str:
 
 
 def port_name(name: str) -> str:
-    """Give the name of a port for an argument's: in snake case, and none that nodes or Python keep for themselves."""
+    """Return the name of a port for an argument's: in snake case, and none that nodes or Python keep for themselves."""
     words = _spell(name).strip("_") or "value"
     if not words[0].isalpha():
         words = f"value_{words}"

@@ -1,4 +1,4 @@
-"""What the families that work on pictures with OpenCV's objects share."""
+"""Common code of the families that work on pictures with OpenCV's objects."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def need_picture(node: Node, image: Any, hint: Any = Picture, port: str = "image
 
 
 def gray(image: Any) -> Any:
-    """Give a picture of 1, 3 or 4 channels in one.
+    """Return a picture of 1, 3 or 4 channels in one.
 
     Raises:
       ValueError: it has two.
@@ -39,7 +39,7 @@ def gray(image: Any) -> Any:
 
 
 def colour(image: Any) -> Any:
-    """Give a picture of 1, 3 or 4 channels in three: blue, green, red.
+    """Return a picture of 1, 3 or 4 channels in three: blue, green, red.
 
     Raises:
       ValueError: it has two.

@@ -31,7 +31,7 @@ class _Shared:
 
 
 class Share:
-    """One node's share of a session; to be given back."""
+    """One node's share of a session; must be closed."""
 
     def __init__(self, graph: Graph, key: _Key, shared: _Shared) -> None:
         self._graph = graph
@@ -40,7 +40,7 @@ class Share:
         shared.users += 1
 
     async def session(self) -> Session:
-        """Give it, once it is open.
+        """Return it, once it is open.
 
         Raises:
           TransportError: it cannot be opened.
@@ -66,7 +66,7 @@ class Share:
 
 
 def share(graph: Graph, name: str, settings: str) -> Share:
-    """Give a share of the session of a run.
+    """Return a share of the session of a run.
 
     Args:
       graph: the whole graph that runs.

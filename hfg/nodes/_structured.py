@@ -2,7 +2,7 @@
 
 OpenCV follows what such a file says without a look: an index that is too large ends the process. So all that it will
 follow is compared first. Its parser is foreign code too, so a file is first read and used in a process of its own: who
-kills that one is refused. This module is what that process runs, so it stands on cv2 and numpy alone.
+kills that one is refused. This module is what that process runs, so it depends only on cv2 and numpy.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def model_of(data: bytes) -> Any:
     """Read a model.
 
     Raises:
-      ValueError: it is none that is whole.
+      ValueError: it is not a complete model.
     """
     with _as_value_error():
         storage, node = _top(data)
@@ -67,7 +67,7 @@ def cascade_of(data: bytes) -> Any:
     """Read a cascade.
 
     Raises:
-      ValueError: it is none that is whole.
+      ValueError: it is not a complete model.
     """
     with _as_value_error():
         storage, node = _top(data)
@@ -238,7 +238,7 @@ def _int(node: Any, name: str, otherwise: int = 0) -> int:
 
 
 def _items(node: Any) -> list[Any]:
-    """Of a sequence; what is none has none."""
+    """Return the items of a sequence; other nodes have none."""
     return [node.at(place) for place in range(node.size())] if node.isSeq() else []
 
 
@@ -247,7 +247,7 @@ def _list(node: Any, name: str) -> list[Any]:
 
 
 def _numbers(node: Any) -> list[float]:
-    """Those of a sequence; what else is in it is no number, so that it is nowhere."""
+    """Those of a sequence; what else is in it is not a number, so that it is nowhere."""
     return [one.real() if one.isInt() or one.isReal() else math.nan for one in _items(node)]
 
 
@@ -256,7 +256,7 @@ def _is_whole(number: float) -> bool:
 
 
 def _within(numbers: list[Any], count: int, end: int) -> bool:
-    """Whether there are so many whole numbers, each from 0 to below an end."""
+    """Return whether there are `count` integers, each from 0 to below `end`."""
     return len(numbers) == count and all(one.isInt() and 0 <= one.real() < end for one in numbers)
 
 

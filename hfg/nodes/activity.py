@@ -4,7 +4,7 @@ A behaviour is anything that is begun by a signal with activity and tells that i
 and an event, or a subgraph. The nodes below stand between behaviours. They hold the activity while they wait
 themselves, so what is active shows what the system is doing; connect their events, and those that lead into their
 slots, with `active=True`. Where no activity comes, by edges that are not active, they work just as well as plain
-control of signals. Stands on nodetype and ports, and on graph where the paper draws a subgraph.
+control of signals. Depends on nodetype and ports, and on graph where the paper draws a subgraph.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ __all__ = [
 class ActivityGate(Node):
     """Pass values on while the node is active.
 
-    While it is not there is silence, so that a join behind it stays in step. Activity may come by the slot, or with a
-    value, which then passes. Over an active edge behind an output the first value that passes takes the activity along,
-    so exactly one does: figure 17 b of the paper. Fires when every connected input holds a token.
+    While it is not there is silence, so that a join after it stays in step. Activity may come by the slot, or with a
+    value, which then passes. If an output has an active edge, the first value that passes takes the activity along, so
+    exactly one does: figure 17 b of the paper. Fires when every connected input holds a token.
 
     Attributes:
       values: one stream or several in step.
@@ -100,8 +100,8 @@ class ActivityGenerator(Node):
     """Pass every value on with activity.
 
     Over active edges each value activates whoever takes it, whether the generator is active or not (rule A4); over
-    other edges it is a relay. In most graphs activity comes from `graph.start` alone: this is for those in which data
-    begins something.
+    other edges it is a relay. In most graphs activity comes only from `graph.start`; use this node if data starts
+    something.
 
     Attributes:
       value: anything.
@@ -135,8 +135,8 @@ class _PassWithout(Node):
 class ActivityAbsorber(Subgraph):
     """Pass values on and let the activity that comes with them vanish.
 
-    It is active for a moment, behind the firing in which activity came; nothing that leaves it carries any. The final
-    node of an activity diagram.
+    It is active for a moment, after the firing in which activity arrived; its tokens carry none. The final node of an
+    activity diagram.
 
     Attributes:
       value: anything.
@@ -186,7 +186,7 @@ class InactivityGenerator(Node):
 class WaitForMessage(Node):
     """Hold the activity until the next message: figure 13 of the paper.
 
-    Every message is signalled, active or not; over an active edge the first one behind the activity takes it along. So
+    Every message is signalled, active or not; over an active edge the first one after the activity takes it along. So
     what follows begins with the next message, and messages before that mean nothing to it.
 
     Attributes:
@@ -210,7 +210,7 @@ class WaitForMessage(Node):
 class WaitForText(Node):
     """Hold the activity until a certain text arrives: figure 17 a of the paper, its node `streq`.
 
-    Each text that is the wanted one is signalled, active or not; over an active edge the first one behind the activity
+    Each text that is the wanted one is signalled, active or not; over an active edge the first one after the activity
     takes it along. A start signal that comes too early does nothing.
 
     Attributes:
@@ -242,11 +242,10 @@ class _Export(Node):
 
 
 class OneShotCommand(Subgraph):
-    """Send one command when activity arrives, then hand the activity on: figure 17 b of the paper.
+    """Send one command when activity arrives, then pass the activity on: figure 17 b of the paper.
 
-    Commands come again and again from somewhere, `flow.Latch` or a source with a rate; the gate inside lets the first
-    one pass behind the activity. What leaves carries none: the activity leaves by `done`, as soon as the command is on
-    its way.
+    Commands come again and again from somewhere, `flow.Latch` or a source with a rate; the gate inside passes the first
+    one after the activity. The command carries none: the activity leaves by `done`, as soon as the command was sent.
 
     Attributes:
       value: the command, again and again.
@@ -274,11 +273,11 @@ class OneShotCommand(Subgraph):
 
 
 class Sequence(Node):
-    """Begin several behaviours one after the other.
+    """Run several behaviours one after the other.
 
     `begin` begins the first; when one is done the next one is begun, with the value that it gave. When the last is done
-    so is the sequence. If one gives up the sequence is broken off. What a step says that is not due has no effect, and
-    `begin` begins anew.
+    so is the sequence. If one gives up the sequence is broken off. Signals of a step that is not running have no
+    effect, and `begin` starts over.
 
     Attributes:
       begin: begins the first step with this value.
@@ -324,8 +323,8 @@ class Sequence(Node):
 class Fallback(Node):
     """Try several behaviours one after the other until one succeeds.
 
-    `begin` begins the first; when one gives up the next one is begun, with the value of `begin`. What a way says that
-    is not due has no effect, and `begin` begins anew.
+    `begin` begins the first; when one gives up the next one is begun, with the value of `begin`. Signals of a way that
+    is not running have no effect, and `begin` starts over.
 
     Attributes:
       begin: begins the first way with this value.
@@ -370,10 +369,10 @@ class Fallback(Node):
 
 
 class Parallel(Node):
-    """Begin several behaviours at once, and go on when all are done.
+    """Run several behaviours at once, and continue when all are done.
 
     Activity goes to all of them (§5.2: more than one node at a time) and is gathered here; what a branch says twice
-    counts once. `begin` begins all anew.
+    counts once. `begin` restarts all of them.
 
     Attributes:
       begin: begins all branches with this value.
@@ -406,7 +405,7 @@ class Parallel(Node):
 
 
 class Branch(Node):
-    """Begin one of several behaviours, the one of the number that arrives.
+    """Run one of several behaviours, chosen by the number that arrives.
 
     Attributes:
       begin: the number of the behaviour, from 0.
@@ -427,11 +426,11 @@ class Branch(Node):
 
 
 class Wait(Node):
-    """Hold the activity for some seconds, then hand it on.
+    """Hold the activity for some seconds, then pass it on.
 
-    A wait that is begun while another is under way takes its place. It is broken off, and nothing is signalled, if the
-    activity with which it was begun is taken away meanwhile. `active_for_s` of any node and its event `timeout` do the
-    same for what a node does in that time (rule A12).
+    A wait that is started during another one replaces it. It is broken off, and nothing is signalled, if the activity
+    with which it was begun is taken away meanwhile. `active_for_s` of any node and its event `timeout` do the same for
+    what a node does in that time (rule A12).
 
     Attributes:
       begin: begins to wait; a value is handed on.
@@ -462,11 +461,11 @@ class Wait(Node):
 
 
 class TimeLimit(Node):
-    """Give a behaviour a limited time.
+    """Send a behaviour a limited time.
 
     `begin` begins it. If it is done in time the limit has no effect. Else the activity is taken away from it and led on
-    by `expired`; if it was begun without activity, by edges that are not active, it is only told. What it says behind
-    that has no effect. `begin` begins anew.
+    by `expired`; if it was begun without activity, by edges that are not active, it is only told. Its later signals
+    have no effect. `begin` starts over.
 
     Attributes:
       begin: begins the behaviour with this value.
@@ -511,11 +510,11 @@ class TimeLimit(Node):
 
 
 class Retry(Node):
-    """Begin a behaviour again until it succeeds, a limited number of times.
+    """Run a behaviour repeatedly until it succeeds, a limited number of times.
 
-    `begin` begins it with a value, and so does each attempt that follows one which gave up, behind a pause. In the
-    pause the activity is here; if it is taken away meanwhile all is broken off. `begin` begins anew. What is said while
-    no attempt is under way has no effect.
+    `begin` begins it with a value, and so does each further attempt after one gave up, after a pause. In the pause the
+    activity is here; if it is taken away meanwhile all is broken off. `begin` starts over. Signals while no attempt is
+    in progress have no effect.
 
     Attributes:
       begin: begins the first attempt with this value.

@@ -1,6 +1,6 @@
 """What graphs of CS::APEX use and the other families have no need for; `hfg convert x.apex x.hfg.yaml` names them.
 
-Stands on functions, nodetype and ports.
+Depends on functions, nodetype and ports.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ _LONGEST: Final = 1000
 class ExampleImage(Node):
     """Send a drawn picture again and again, to try a graph with.
 
-    A source without end that sends as fast as its consumers take; give it a rate with `max_rate_hz`. Every picture is
-    one array that is not drawn anew, so it must not be written into.
+    A source without end that sends as fast as its consumers take; give it a rate with `max_rate_hz`. All pictures are
+    the same array, so it must not be written to.
 
     Attributes:
       picture: a chessboard of grey, stripes of colours, or a ramp from black to white with a disc.
@@ -121,7 +121,7 @@ class UserSwitch(Node):
 
 
 def _is_script(script: str) -> bool:
-    """Whether a text is an expression that `combine_images` can read."""
+    """Return whether a text is an expression that `combine_images` can read."""
     try:
         _parsed(script)
     except ValueError:
@@ -134,7 +134,7 @@ def _parsed(script: str) -> ast.expr:
     """Read a script.
 
     Raises:
-      ValueError: it is none.
+      ValueError: it is not one.
     """
     if len(script) > _LONGEST:
         raise ValueError(f"the script has {len(script)} characters; none has more than {_LONGEST}")
@@ -142,7 +142,7 @@ def _parsed(script: str) -> ast.expr:
     try:
         tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise ValueError(f'"{script}" is no expression ({error}); write one as in "255 - $1"') from error
+        raise ValueError(f'"{script}" is not an expression ({error}); write one as in "255 - $1"') from error
     _need_known(tree, script)
     return tree
 
@@ -227,7 +227,9 @@ def _value(tree: ast.expr, images: list[Any]) -> Any:
         case ast.Name(id=name):
             number = int(name.strip("_").removeprefix("image_"))
             if number > len(images):
-                raise ValueError(f"${number} is no image: there are {len(images)}; correct the script, or add inputs")
+                raise ValueError(
+                    f"${number} is not an image: there are {len(images)}; correct the script, or add inputs"
+                )
             return images[number - 1]
         case ast.UnaryOp(op=op, operand=inner):
             return _OPERATORS[type(op)](_value(inner, images))

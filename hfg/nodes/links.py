@@ -1,4 +1,4 @@
-"""Programs that meet by a name: what one publishes the others subscribe to, started in any order.
+"""Programs that connect by a name: one publishes, the others subscribe, started in any order.
 
     hfg.publish("camera/front", camera.out)          # in one program
     hfg.subscribe("camera/front", viewer.picture)    # in another
@@ -35,30 +35,30 @@ __all__ = ["Publish", "Subscribe"]
 
 
 class Publish(Node):
-    """Give all values to the programs that subscribe to a name.
+    """Send all values to the programs that subscribe to a name.
 
-    Subscribers that want every value get every value from the moment they join, once and in order, and hold this node
-    up when they are slow; `lossless=False` waits for nobody. Whatever the node is connected to gives the type. Markers
-    of silence and activity do not cross: an active edge belongs to one graph. The end does.
+    Subscribers that want every value get every value from the moment they join, once and in order, and slow this node
+    down when they are slow; with `lossless=False` it does not wait. The connected port determines the type. Markers of
+    silence and activity do not cross: an active edge belongs to one graph. The end does.
 
     Attributes:
       value: what is published, with its stamp.
-      name: by which the programs meet, "camera/front".
-      lossless: whether subscribers that want every value are waited for.
-      window: how many values may be on their way to them.
-      absent: what to do while nobody has subscribed: "pass" lets values go by; "wait" waits, also for somebody who
-        takes the place of the last subscriber, and then nothing is lost by its death.
-      outbox: a file that keeps what is published and not done, on the disk before it leaves: a program that is killed
-        and begun again goes on with it, and subscribers that have lived on get each value once. It waits as with
-        absent="wait"; empty: what was on its way is lost with the program.
+      name: the common name of the programs, "camera/front".
+      lossless: whether to wait for subscribers that want every value.
+      window: how many values may be in transit to them.
+      absent: what to do while there is no subscriber: "pass" discards values; "wait" waits, including for a successor
+        of the last subscriber, so that nothing is lost by its death.
+      outbox: a file for unacknowledged values, written before they are sent. A program that is killed and restarted
+        resumes with them, and subscribers that kept running receive each value once. It waits as with absent="wait";
+        empty: values in transit are lost with the program.
       transport: "local", "zenoh" or "memory"; empty: the environment variable HFG_TRANSPORT, else memory in virtual
         time, Zenoh if settings name an address, and local sockets if not.
       settings: the settings file of Zenoh, or the name of a network in memory; empty: HFG_SETTINGS, else none: programs
         of this user on this computer.
 
     Raises:
-      UsageError: it is connected to no port whose values can cross, the name is none, or an outbox is asked for with
-        lossless=False.
+      UsageError: it is not connected to a port whose values can be sent to another process, the name is not valid, or
+        an outbox is used with lossless=False.
       RunError: the outbox cannot be used.
       TransportError: the transport cannot be used, or a value is too large for it.
       EncodingError: a value is not of the type.
@@ -79,8 +79,8 @@ class Publish(Node):
         name = need_link_name(self.name)
         if self.outbox and not self.lossless:
             raise UsageError(
-                f'"{name}" is published with lossless=False, which waits for nobody, and with an outbox, from which '
-                "nothing is to get lost: take one of the two"
+                f'"{name}" is published with lossless=False, which does not wait for subscribers, and with an outbox, '
+                "from which nothing must get lost: use only one of the two"
             )
         self._share = share(_whole(self), self.transport, self.settings)
         session = await self._share.session()
@@ -122,23 +122,24 @@ class Publish(Node):
 class Subscribe(Node):
     """Send what another program publishes by a name: a source that waits for it.
 
-    It waits until somebody publishes, and takes part in what the first one does that fits; when that has gone, in what
-    the next one does. What is connected to it gives the type. Its tokens have the stamps of the publisher's clock.
+    It waits for a publisher, and subscribes to the first one that matches; when this one has gone, to the next. The
+    connected ports determine the type. Its tokens have the stamps of the publisher's clock.
 
     Attributes:
       out: what was published.
-      name: by which the programs meet, "camera/front".
-      overflow: "wait": every value, and the publisher waits for this program; else what becomes of one too many, as on
-        edges from events, and nobody waits: "latest", "drop_oldest", "drop_newest", "error".
+      name: the common name of the programs, "camera/front".
+      overflow: "wait": every value, and the publisher waits for this program; otherwise the overflow policy, as on
+        edges from events, and the publisher does not wait: "latest", "drop_oldest", "drop_newest", "error".
       capacity: how many values wait here.
       latest: begin with the latest value that was published before.
-      at_end: what to do when what was published has ended: "end", or "wait" for somebody who publishes it anew.
+      at_end: what to do when the stream has ended: "end", or "wait" for another publisher.
       if_gone: what to do when a publisher has gone without an end: "wait" until one returns, or "end".
-      transport: as of `Publish`.
-      settings: as of `Publish`.
+      transport: as for `Publish`.
+      settings: as for `Publish`.
 
     Raises:
-      UsageError: it is connected to no port whose values can cross, or to ports of several types, or the name is none.
+      UsageError: it is not connected to a port whose values can be sent to another process, or to ports of several
+        types, or the name is not valid.
       TransportError: the transport cannot be used.
       QueueOverflow: a value was too many, under overflow="error".
     """
@@ -198,7 +199,7 @@ def _who(node: Node) -> str:
 
 
 def _type_of(node: Publish | Subscribe) -> Any:
-    """Give the type of the ports at the other end of the node's edges."""
+    """Return the type of the ports at the other end of the node's edges."""
     what = "published" if isinstance(node, Publish) else "subscribed to"
     named = f'"{need_link_name(node.name)}" cannot be {what} by "{node.place.path}"'
     ports: list[Any] = []

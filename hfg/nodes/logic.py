@@ -1,6 +1,6 @@
 """Truth values: operations on them, comparisons that give them, and events that they turn into and come from.
 
-Stands on nodetype, functions and ports.
+Depends on nodetype, functions and ports.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ T = TypeVar("T")
 
 @node(inputs={"values": Inputs(bool, 2)}, outputs=bool)
 def logical_and(*values: bool) -> bool:
-    """Give true if all values are true.
+    """Return true if all values are true.
 
     Fires once all inputs hold a token; silence at one of them is silence, and the end of one is the end.
 
@@ -62,7 +62,7 @@ def logical_and(*values: bool) -> bool:
 
 @node(inputs={"values": Inputs(bool, 2)}, outputs=bool)
 def logical_or(*values: bool) -> bool:
-    """Give true if at least one value is true.
+    """Return true if at least one value is true.
 
     Fires once all inputs hold a token; silence at one of them is silence, and the end of one is the end.
 
@@ -74,7 +74,7 @@ def logical_or(*values: bool) -> bool:
 
 @node(inputs={"values": Inputs(bool, 2)}, outputs=bool)
 def logical_xor(*values: bool) -> bool:
-    """Give true if an odd number of values is true; of two, if they differ.
+    """Return true if an odd number of values is true; of two, if they differ.
 
     Fires once all inputs hold a token; silence at one of them is silence, and the end of one is the end.
 
@@ -86,7 +86,7 @@ def logical_xor(*values: bool) -> bool:
 
 @node(inputs={"values": Inputs(bool, 2)}, outputs=bool)
 def logical_nand(*values: bool) -> bool:
-    """Give true unless all values are true.
+    """Return true unless all values are true.
 
     Fires once all inputs hold a token; silence at one of them is silence, and the end of one is the end.
 
@@ -100,7 +100,7 @@ def logical_nand(*values: bool) -> bool:
 
 @node(inputs={"values": Inputs(bool, 2)}, outputs=bool)
 def logical_nor(*values: bool) -> bool:
-    """Give true if no value is true.
+    """Return true if no value is true.
 
     Fires once all inputs hold a token; silence at one of them is silence, and the end of one is the end.
 
@@ -112,7 +112,7 @@ def logical_nor(*values: bool) -> bool:
 
 @node
 def logical_not(value: bool) -> bool:
-    """Give the opposite.
+    """Return the opposite.
 
     Args:
       value: a truth value.
@@ -150,7 +150,7 @@ def boolean(
 
 @node(inputs={"values": Inputs(bool, 3)}, outputs=bool, parameters={"count": Parameter(2, Interval(ge=0))})
 def at_least(*values: bool, count: int) -> bool:
-    """Give true if so many values are true, as when sensors vote.
+    """Return true if at least `count` values are true, as when sensors vote.
 
     Fires once all inputs hold a token; silence at one of them is silence, and the end of one is the end.
 
@@ -163,7 +163,7 @@ def at_least(*values: bool, count: int) -> bool:
 
 @node
 def choose(condition: bool, if_true: T, if_false: T) -> T:
-    """Give one of two values.
+    """Return one of two values.
 
     Both values are taken in each firing, the other one is dropped; `hfg.nodes.flow` has a multiplexer that does not
     wait for what is not chosen.
@@ -305,7 +305,7 @@ class Hysteresis(Node):
     answer = State[bool | None](None)
 
     def process(self, value: float) -> bool:
-        """Give the answer."""
+        """Return the answer."""
         if self.low > self.high:
             raise ValueError(f"the low limit {self.low} is above the high one {self.high}: exchange them")
         before = self.initially if self.answer is None else self.answer
@@ -323,7 +323,7 @@ class Hysteresis(Node):
 class BooleanTrigger(Node):
     """Turn truth values into signals: one event for true, another for false.
 
-    Each value triggers exactly one of the two, also if it is the same as before; see Edges for changes.
+    Each value triggers exactly one of the two, even if it is the same as before; see Edges for changes.
 
     Attributes:
       value: a truth value.
@@ -367,11 +367,11 @@ class TriggerIfEqual(Node):
 class Edges(Node):
     """Signal the changes of a truth value.
 
-    The first value changes nothing unless `initially` says what was before it. Silence is no change.
+    The first value changes nothing unless `initially` says the previous value it. Silence is not a change.
 
     Attributes:
       value: a truth value.
-      initially: what was before the first value: "true", "false", or "unknown", which no value differs from.
+      initially: the previous value the first value: "true", "false", or "unknown", which no value differs from.
       rising: a false value was followed by a true one.
       falling: a true value was followed by a false one.
       changed: the new value, with both.
@@ -452,8 +452,8 @@ class Stable(Node):
 class Toggle(Node):
     """Generate a truth value that is switched while the graph runs; a source.
 
-    It gives its value as often as its consumers and `max_rate_hz` allow, and does not end. A switch takes effect
-    with the next value; `changed` tells of it at once. See FlipFlop for a switch that is no source.
+    It gives its value as often as its consumers and `max_rate_hz` allow, and does not end. A switch takes effect with
+    the next value; `changed` tells of it at once. See FlipFlop for a switch that is not a source.
 
     Attributes:
       signal: the value.
@@ -472,7 +472,7 @@ class Toggle(Node):
     told = State[bool | None](None)
 
     def process(self) -> bool:
-        """Give the value."""
+        """Return the value."""
         self._tell(self.value)
         return self.value
 
@@ -525,7 +525,7 @@ class FlipFlop(Node):
     value = State[bool | None](None)
 
     def process(self, ask: object) -> bool:
-        """Give the value."""
+        """Return the value."""
         return self._now()
 
     @slot
@@ -558,7 +558,7 @@ class EventAnd(Node):
     Attributes:
       event: what must happen, one slot for each; several of one count once.
       all: all of them have happened.
-      forget: starts anew.
+      forget: starts over.
 
     CS::APEX: csapex::EventAND.
     """
@@ -576,5 +576,5 @@ class EventAnd(Node):
 
     @slot
     def forget(self) -> None:
-        """Start anew."""
+        """Start over."""
         self.happened = set()

@@ -1,12 +1,10 @@
 """Node types of the functions of any module: `from_module(scipy.ndimage)`.
 
-Arguments that are arrays are inputs, and so is everything that must be given and of which nothing else is said; what
-has a default or is said to be a number, a text or a choice is a parameter. What the signature does not say is read from
-the docstring, in the form of numpy or Google.
+Arguments that are arrays are inputs, and so are required arguments without a declared type; arguments with a default,
+or declared as a number, a string or a choice, are parameters. Types that the signature lacks are read from the
+docstring, in the form of numpy or Google.
 
-    # my_robot/filters.py
-    import scipy.ndimage
-    from hfg.nodes import from_module
+    # my_robot/filters.py import scipy.ndimage from hfg.nodes import from_module
 
     filters = from_module(scipy.ndimage)
 
@@ -40,16 +38,16 @@ __all__ = ["FunctionNodes", "from_module"]
 
 
 def from_module(module: ModuleType, *, only: Collection[str] | None = None) -> FunctionNodes:
-    """Give the functions of a module as node types; each is made when it is first named.
+    """Return the functions of a module as node types; each is made when it is first named.
 
-    Give the result a name at the top of a module of your own, so that files and other processes find the types.
+    Assign the result to a name at the top of a module of your own, so that files and other processes find the types.
 
     Args:
       module: any module; what its `__all__` lists, or else what is defined in it and has no underscore.
       only: the names to take instead.
 
     Raises:
-      DeclarationError: it is no module, or `only` names what it does not have.
+      DeclarationError: it is not a module, or `only` has a name that it lacks.
 
     Examples:
       >>> import math
@@ -64,7 +62,7 @@ def from_module(module: ModuleType, *, only: Collection[str] | None = None) -> F
     names = _public(module) if only is None else list(only)
     missing = [name for name in names if not hasattr(module, name)]
     if missing:
-        raise DeclarationError(f'module {module.__name__} has no "{missing[0]}": mend only=')
+        raise DeclarationError(f'module {module.__name__} has no "{missing[0]}": correct only=')
     home = sys._getframe(1).f_globals.get("__name__", "__main__")
     return FunctionNodes(module, names, home)
 
@@ -91,7 +89,7 @@ class FunctionNodes(TypesByName):
         if name.startswith("__") or name not in self.names:
             reason = "" if name.startswith("__") else self.not_nodes.get(name)
             why = f": {reason}" if reason else f"; there are {', '.join(self.names[:8])} ..."
-            raise AttributeError(f'"{name}" of {self._functions.__name__} is no node type{why}')
+            raise AttributeError(f'"{name}" of {self._functions.__name__} is not a node type{why}')
         made = self._made.get(name)
         if made is None:
             made = self._made.setdefault(name, self._make(name))  # two threads may ask at once; there is one of each
@@ -330,7 +328,7 @@ def _outputs(told: _Told, hints: Mapping[str, Any], taken: set[str]) -> tuple[Po
 
 
 def _hints(function: Any) -> dict[str, Any]:
-    """Give the annotations that can be read at run time."""
+    """Return the annotations that can be read at run time."""
     try:
         return {name: hint for name, hint in typing.get_type_hints(function).items() if is_hint(hint)}
     except Exception:  # names that exist for type checkers only
@@ -361,7 +359,7 @@ def _caller(
 
 
 def _bound(function: Callable[..., Any], arguments: dict[str, Any]) -> Any:
-    """Call by name where that is allowed; functions of C libraries take some arguments by position alone."""
+    """Call by name where that is allowed; functions of C libraries take some arguments only by position."""
     by_position = []
     rest = dict(arguments)
     for one in inspect.signature(function).parameters.values():

@@ -59,7 +59,7 @@ class Playback(Node):
         tell_losses(self._player, self._recording)
 
     def ready(self) -> bool:
-        """Whether the next token is due."""
+        """Return whether the next token is due."""
         return self._player.ready()
 
     def process(self) -> None:

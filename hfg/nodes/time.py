@@ -1,7 +1,7 @@
 """Time: clocks, tickers, schedules, stamps; how long something took, how old it is, how often it comes, if at all.
 
 Times are seconds on the run's clock, so everything here is exact in virtual time. `now` and stamps are Unix time on the
-real clock and begin at 0 in virtual time; `elapsed` begins at 0 in both. Stands on nodetype, functions, ports and
+real clock and begin at 0 in virtual time; `elapsed` begins at 0 in both. Depends on nodetype, functions, ports and
 clock.
 """
 
@@ -49,12 +49,11 @@ _FOR_EVER_S = 1e12
 
 
 class Ticker(Node):
-    """Give a number again and again, without drift.
+    """Send a number again and again, without drift.
 
-    The first tick comes `phase_s` behind the moment at which the node begins, and so begins a grid. A tick that is
-    late, because its consumers were not ready, does not move the grid; what was missed by more than a period is not
-    made up, and its numbers are missing (rule F11). A new period holds from the next tick on. The stamp is the moment
-    of the tick.
+    The first tick comes `phase_s` after the start of the node, and starts a grid. A tick that is late, because its
+    consumers were not ready, does not move the grid; what was missed by more than a period is not made up, and its
+    numbers are missing (rule F11). A new period holds from the next tick on. The stamp is the moment of the tick.
 
     Attributes:
       period_s: from one tick to the next, in seconds; of no effect if there is a rate.
@@ -96,7 +95,7 @@ async def _until(due: float) -> None:
 
 
 class Schedule(Node):
-    """Give each moment of a list when it comes, then end.
+    """Send each moment of a list when it comes, then end.
 
     Moments that have passed already when their turn comes, as when the consumers were not ready, are given at once. The
     stamp is the moment at which one is given.
@@ -110,7 +109,7 @@ class Schedule(Node):
     instants_s = Parameter((), type=tuple[float, ...], unit="s")
 
     async def process(self) -> AsyncIterator[None]:
-        """Give them."""
+        """Yield them."""
         for instant in sorted(self.instants_s):
             await _until(instant)
             self.instant.send(instant, stamp=clock.now())
@@ -118,7 +117,7 @@ class Schedule(Node):
 
 
 class Clock(Node):
-    """Give the time, again and again: a source without end.
+    """Send the time, again and again: an endless source.
 
     As fast as the consumers allow, or at the rate of its `max_rate_hz`, which the check asks for.
 
@@ -140,7 +139,7 @@ class Clock(Node):
 
 @node
 def now(value: object) -> float:
-    """Give the time at which a value arrives.
+    """Return the time at which a value arrives.
 
     Args:
       value: anything.
@@ -150,7 +149,7 @@ def now(value: object) -> float:
 
 @node
 def elapsed(value: object) -> float:
-    """Give the seconds since the start of the run at which a value arrives.
+    """Return the seconds since the start of the run at which a value arrives.
 
     Args:
       value: anything.
@@ -160,7 +159,7 @@ def elapsed(value: object) -> float:
 
 @node
 def stamp_of(value: Token[object]) -> float:
-    """Give the stamp of a value: the time of the measurement that it came from (rule T5).
+    """Return the stamp of a value: the time of the measurement that it came from (rule T5).
 
     Args:
       value: anything.
@@ -172,7 +171,7 @@ def stamp_of(value: Token[object]) -> float:
 
 @node
 def age(value: Token[object]) -> float:
-    """Give the seconds from the stamp of a value to now: how long it took to come here.
+    """Return the seconds from the stamp of a value to now: how long it took to come here.
 
     Args:
       value: anything.
@@ -220,7 +219,7 @@ def shift(time: float, *, offset_s: Annotated[float, Unit("s")] = 0.0) -> float:
 
 @node
 def duration(later: float, earlier: float | None = None) -> float:
-    """Give the seconds from one time to another.
+    """Return the seconds from one time to another.
 
     Without an earlier one, to the present: then the result is negative if `later` has passed.
 
@@ -236,7 +235,7 @@ def duration(later: float, earlier: float | None = None) -> float:
 class Stopwatch(Node):
     """Measure the seconds between two signals.
 
-    `begin` begins anew, `stop` tells and ends the measurement; without a beginning it tells nothing. A signal counts
+    `begin` starts over, `stop` tells and ends the measurement; without a beginning it tells nothing. A signal counts
     when its turn comes, or at its stamp, which says when it was measured.
 
     Attributes:
@@ -269,7 +268,7 @@ class Stopwatch(Node):
 
 
 class SinceLast(Node):
-    """Give the seconds between the stamps of a value and the one before.
+    """Send the seconds between the stamps of a value and the one before.
 
     For the first value there is silence.
 
@@ -289,7 +288,7 @@ class SinceLast(Node):
 
 
 class RateMeter(Node):
-    """Give the rate at which values come, by their stamps.
+    """Send the rate at which values come, by their stamps.
 
     The mean over the last values, with each from the second on; before there is silence, and so there is while all of
     them have one stamp.
@@ -318,14 +317,14 @@ class RateMeter(Node):
 
 
 class Deadline(Node):
-    """Tell when nothing has come for some time, and when something comes again.
+    """Signal when nothing has arrived for some time, and when something arrives again.
 
-    Values may come by the input, and are passed on, or by the slot; either is a sign of life. Silence is none. The
-    watch begins with the run, or with the first value, and ends with the input. What is missed is told once.
+    Values may come by the input, and are passed on, or by the slot; either is a sign of life. Silence is not. The watch
+    begins with the run, or with the first value, and ends with the input. A missed deadline is signalled once.
 
     Attributes:
       value: anything; passed on.
-      beat: a sign of life beside the input.
+      beat: a sign of life in addition to the input.
       out: the same values.
       seconds: how long nothing may come; looked at with each sign of life.
       from_start: whether the watch begins with the run, else with the first sign of life.

@@ -162,9 +162,9 @@ def test_an_array_that_is_not_there_is_refused(name: str, tmp_path: Path) -> Non
     (tmp_path / "a.npy").write_bytes(ARRAYS[name])
     (tmp_path / "a.npz").write_bytes(npz(a=ARRAYS[name]))
     for node, file in ((read_array(), "a.npy"), (read_arrays(), "a.npz")):
-        with pytest.raises((HfgError, ValueError), match="is no file of numpy without Python objects"):
+        with pytest.raises((HfgError, ValueError), match="is not a numpy file without Python objects"):
             fire(node, path=tmp_path / file)
-    with pytest.raises((HfgError, ValueError), match="is no file of numpy|has no rows"):
+    with pytest.raises((HfgError, ValueError), match="is not a numpy file|has no rows"):
         fire(ArrayRows(path=str(tmp_path / "a.npy")))
 
 

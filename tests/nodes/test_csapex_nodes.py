@@ -77,7 +77,7 @@ def test_what_is_no_expression_is_refused_and_never_run(script: str) -> None:
 
 
 def test_an_image_without_an_input_and_other_sizes_are_errors() -> None:
-    with pytest.raises(ValueError, match=r"\$3 is no image: there are 2"):
+    with pytest.raises(ValueError, match=r"\$3 is not an image: there are 2"):
         combined("$3", image(1), image(2))
     with pytest.raises(ValueError, match="images of 1x1, 1x2x3 cannot be combined|cannot be combined"):
         combined("$1 + $2", image(1, 2), np.zeros((2, 3), np.uint8))

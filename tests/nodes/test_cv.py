@@ -66,7 +66,7 @@ def test_what_is_no_node_says_why() -> None:
     assert not set(reasons) & set(_recipes.names().values())
     assert reasons["imshow"] == "it needs a window: hfg.nodes.display shows pictures"
     assert reasons["getTickCount"] == "it takes no array, so it would be a source without end"
-    with pytest.raises(AttributeError, match="cv2.imshow is no node: it needs a window"):
+    with pytest.raises(AttributeError, match="cv2.imshow is not a node type: it needs a window"):
         _ = cv.imshow
     with pytest.raises(AttributeError, match="has no attribute 'gausian_blur'$"):
         _ = cv.gausian_blur

@@ -203,12 +203,12 @@ def test_a_run_that_is_stopped_stacks_what_there_is() -> None:
 @pytest.mark.parametrize(
     ("node", "content", "sentence"),
     [
-        (files.read_array(), b"nonsense", '"a" is no file of numpy'),
-        (files.read_array(), b"", '"a" is no file of numpy'),
-        (files.read_arrays(), b"PK\x03\x04nonsense", '"a" is no file of numpy'),
-        (files.read_image(), b"nonsense", '"a" is no picture'),
-        (files.read_image(), b"", '"a" is no picture'),
-        (files.read_raw_image(), cv2.imencode(".png", PICTURE)[1].tobytes()[:40], '"a" is no picture'),
+        (files.read_array(), b"nonsense", '"a" is not a numpy file'),
+        (files.read_array(), b"", '"a" is not a numpy file'),
+        (files.read_arrays(), b"PK\x03\x04nonsense", '"a" is not a numpy file'),
+        (files.read_image(), b"nonsense", '"a" is not a picture'),
+        (files.read_image(), b"", '"a" is not a picture'),
+        (files.read_raw_image(), cv2.imencode(".png", PICTURE)[1].tobytes()[:40], '"a" is not a picture'),
     ],
 )
 def test_a_file_of_another_kind_is_told(node: Any, content: bytes, sentence: str) -> None:
@@ -235,7 +235,7 @@ def test_one_array_and_several_are_told_apart() -> None:
         fire(files.read_array(), path="a.npz")
     np.save("one.npy", np.float64(1))
     for path, what in (("one.npy", "one value"), ("a.npz", "several arrays")):
-        with pytest.raises(ValueError, match=f"has no rows, for it holds {what}"):
+        with pytest.raises(ValueError, match=f"has no rows because it holds {what}"):
             fire(files.ArrayRows(path=path))
 
 
@@ -388,7 +388,7 @@ def test_a_file_that_is_no_picture_is_an_error_or_told() -> None:
     node = files.ImageFiles(pattern="in/*.png", order="number", skip_invalid=True)
     assert [fire(node).events for _ in range(4)][3] == [("invalid", "in/11.png")]
     assert len(everything(files.ImageFiles(pattern="in/*.png", skip_invalid=True), "image")) == 3
-    with pytest.raises(hfg.errors.NodeError, match='"in/11.png" is no picture'):
+    with pytest.raises(hfg.errors.NodeError, match='"in/11.png" is not a picture'):
         everything(files.ImageFiles(pattern="in/*.png"), "image")
 
 
@@ -592,7 +592,7 @@ def test_a_file_is_no_directory() -> None:
     with pytest.raises(NotADirectoryError, match="a part of the path is a file, no directory"):
         fire(files.list_directory(), path="a")
     for pattern in ("", "/absolute"):
-        with pytest.raises(ValueError, match="is no pattern of names"):
+        with pytest.raises(ValueError, match="is not a pattern for names"):
             fire(files.list_directory(pattern=pattern), path=".")
 
 

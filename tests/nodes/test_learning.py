@@ -130,7 +130,7 @@ def test_a_trainer_learns_by_itself_after_so_many_samples_and_forgets_when_told(
     samples = [BLUE[0], RED[0], BLUE[1], RED[1], BLUE[2], RED[2]]
     assert [len(fire(trainer, sample=one).events) for one in samples] == [0, 0, 1, 0, 0, 1]
     fire(trainer, slot="clear")
-    with pytest.raises(ValueError, match="no samples to learn from yet"):
+    with pytest.raises(ValueError, match="no samples to train on"):
         fire(trainer, slot="train")
 
 

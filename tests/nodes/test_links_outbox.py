@@ -222,7 +222,10 @@ def test_a_value_is_in_the_file_or_the_whole_change_is_not(file: str) -> None:
 @pytest.mark.parametrize(
     ("how", "sentence"),
     [
-        ({"lossless": False}, "which waits for nobody, and with an outbox, from which nothing is to get lost"),
+        (
+            {"lossless": False},
+            "which does not wait for subscribers, and with an outbox, from which nothing must get lost",
+        ),
         ({"outbox": "/no/such/folder/box"}, "cannot be used: unable to open database file; use a writable path"),
     ],
 )

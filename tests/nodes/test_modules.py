@@ -52,9 +52,9 @@ def test_an_array_with_none_as_its_default_may_be_left_out() -> None:
 def test_what_cannot_be_a_node_says_why() -> None:
     assert filters.not_nodes["generic_filter"] == 'its argument "function" is a function'
     assert "generic_filter" not in filters
-    with pytest.raises(AttributeError, match='"generic_filter" of scipy.ndimage is no node type: its argument'):
+    with pytest.raises(AttributeError, match='"generic_filter" of scipy.ndimage is not a node type: its argument'):
         _ = filters.generic_filter
-    with pytest.raises(AttributeError, match='"gausian" of scipy.ndimage is no node type; there are'):
+    with pytest.raises(AttributeError, match='"gausian" of scipy.ndimage is not a node type; there are'):
         _ = filters.gausian
 
 
@@ -115,7 +115,7 @@ def test_without_a_name_in_a_module_there_is_no_reference() -> None:
     ("module", "only", "sentence"),
     [
         ("scipy.ndimage", None, "from_module takes a module, got 'scipy.ndimage': import it and give it"),
-        (math, ["sine"], 'module math has no "sine": mend only='),
+        (math, ["sine"], 'module math has no "sine": correct only='),
     ],
 )
 def test_what_is_no_module_or_not_in_it_is_refused(module: Any, only: Any, sentence: str) -> None:

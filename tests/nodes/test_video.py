@@ -100,7 +100,7 @@ def test_a_pattern_reads_pictures(tmp_path: Path) -> None:
     ("path", "start", "sentence"),
     [
         ("", 0, 'no video is named: set path, as in VideoFile(path="people.avi")'),
-        ("nowhere.avi", 0, 'there is no video "nowhere.avi": mend path, or put the file there'),
+        ("nowhere.avi", 0, 'there is no video "nowhere.avi": correct path, or put the file there'),
         ("text.avi", 0, "cannot be read as a video: it is damaged, or of a kind that this OpenCV does not know"),
         ("film.avi", 12, "has 10 pictures, so none has the number 12"),
     ],
@@ -115,7 +115,7 @@ def test_a_video_that_cannot_be_read_is_one_sentence(
 
 
 def test_a_camera_that_is_not_there_is_one_sentence() -> None:
-    with pytest.raises(Exception, match="there is no camera 99, or another program uses it: mend device"):
+    with pytest.raises(Exception, match="there is no camera 99, or another program uses it: correct device"):
         fire(video.Camera(device=99))
     with pytest.raises(OSError, match="there is no camera -1: cameras are counted from 0"):
         fire(video.Camera(device=-1))

@@ -118,7 +118,7 @@ def test_a_cascade_that_is_not_there_names_those_that_are(tmp_path: Any) -> None
         fire(vision.CascadeDetector(cascade="nose"), image=np.zeros((9, 9), np.uint8))
     wrong = tmp_path / "wrong.xml"
     wrong.write_text("<no cascade>")
-    with pytest.raises(ValueError, match="is no cascade"):
+    with pytest.raises(ValueError, match="is not a cascade"):
         fire(vision.CascadeDetector(cascade=str(wrong)), image=np.zeros((9, 9), np.uint8))
 
 

@@ -432,7 +432,7 @@ def test_of_two_lives_the_agent_begins_the_next_when_the_former_is_gone_and_an_o
         first, second = begun["far"]
         assert first._task.done()
         assert not second._task.done()
-        with pytest.raises(QueryRefused, match="life 1 of group"):
+        with pytest.raises(QueryRefused, match="incarnation 1 of group"):
             await start(1)
         assert "no process of it" in (await ask(realm.session, place, Wait("hfg/one", "far", 1), Gone)).how
         assert (await ask(realm.session, place, Wait("hfg/one", "far", 2), Gone, timeout_s=60)).how == ""

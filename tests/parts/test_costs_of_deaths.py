@@ -122,7 +122,8 @@ def test_check_knows_that_a_ledger_does_not_count_what_is_lost_before_it() -> No
     assert 'it ends the run because "pair" would pair tokens that do not belong together' in joined.what
     assert (
         joined.why
-        == '"then.out -> pair.a" leads to group "keeps", whose ledger knows the tokens that have arrived but ' 'not the lost'
+        == '"then.out -> pair.a" leads to group "keeps", whose ledger knows the tokens that have arrived but '
+        "not the lost ones"
     )
     alone, *_ = costs_of_deaths(into_a_ledger(joins=False))
     assert alone.what == "a death costs an unknown number of tokens"

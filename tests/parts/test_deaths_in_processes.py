@@ -65,4 +65,4 @@ def test_a_process_that_is_killed_tears_no_pair_and_what_it_lost_is_reported() -
     assert sum(lost.values()) == COUNT - len(found)
     assert all(any(label in error and "lost with a process" in error for error in report.errors) for label in lost)
     assert any("restarted 1 times" in error for error in report.errors)
-    assert any("up to 2 firings and slot calls under way" in error for error in report.errors)
+    assert any("up to 2 firings and slot calls in progress" in error for error in report.errors)

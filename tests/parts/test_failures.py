@@ -101,7 +101,7 @@ def test_a_failure_crosses_with_what_was_taken_and_without_what_cannot(seen: lis
     assert "raise Broken" in where
     assert "hfg/engine" not in where
     assert left_out.startswith('"thing" is not among what it had taken: ')
-    assert "Any cannot cross" in left_out
+    assert "Any cannot be sent" in left_out
 
 
 @pytest.mark.rule("X1", "X2", "L4")

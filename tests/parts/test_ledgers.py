@@ -206,7 +206,9 @@ def test_a_ledger_that_is_broken_or_of_another_graph_is_refused_with_one_sentenc
     graph = in_file(path)
     graph.add(Sink(), name="another", group="total")
     graph.connect(graph["total"].out, graph["another"].value)
-    with pytest.raises(RunError, match='the ledger of group "total" belongs to another graph: "another" is in only one'):
+    with pytest.raises(
+        RunError, match='the ledger of group "total" belongs to another graph: "another" is in only one'
+    ):
         undisturbed(graph)
     file = LedgerFile(str(tmp_path / "ledger.total"), "total")
     with pytest.raises(RunError, match='ledger ".*ledger.total" of group "total" cannot be used: database is locked'):

@@ -259,7 +259,7 @@ def test_without_room_for_a_ring_arrays_are_copied_and_it_is_said_why(
     taken.close()
     assert edge.shares == []
     (record,) = caplog.records
-    assert 'edge "a.out -> b.in" copies its arrays: there is shared memory named' in record.getMessage()
+    assert 'edge "a.out -> b.in" copies its arrays: shared memory named' in record.getMessage()
 
 
 def test_who_sweeps_removes_nothing_of_who_lives() -> None:

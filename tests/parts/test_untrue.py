@@ -237,7 +237,7 @@ def test_what_a_part_says_and_is_not_so_is_refused_and_said_once_and_changes_not
     report = world.run(plan)
     assert (report.outcome, report.outputs, report.errors) == ("done", WANTED, [])
     assert [who for who, _ in world.refused] == ["liar", "liar"]
-    assert len([line for line in caplog.messages if 'group "liar" is not believed: it has said' in line]) == 1
+    assert len([line for line in caplog.messages if 'group "liar" is not trusted: it has sent' in line]) == 1
 
 
 @pytest.mark.rule("L4")

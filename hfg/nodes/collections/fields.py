@@ -1,6 +1,6 @@
 """What is inside of a value: keys of dicts, fields of records, items of lists; methods and private names are not.
 
-Stands on dataclasses and msgspec.
+Depends on dataclasses and msgspec.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def read_field(value: Any, path: str) -> Any:
     """Follow a path such as "pose.x" or "points.0.x" into a value; an empty one is the value itself.
 
     Raises:
-      LookupError: there is nothing of that name; the sentence says what there is.
+      LookupError: there is nothing of that name; the message says what there is.
     """
     for name in path.split(".") if path else ():
         value = _one(value, name, path)
@@ -45,7 +45,7 @@ def _one(value: Any, name: str, path: str) -> Any:
 
 
 def record_fields(value: Any) -> list[str]:
-    """Name the fields of a record; other objects have none, for who knows what their attributes do."""
+    """Name the fields of a record; other objects have none, because reading their attributes may do anything."""
     if isinstance(value, type):
         return []
     if dataclasses.is_dataclass(value):

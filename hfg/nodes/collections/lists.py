@@ -1,4 +1,4 @@
-"""Lists: built, joined, taken apart, put in order, searched. Stands on functions, nodetype and ports."""
+"""Lists: built, joined, taken apart, put in order, searched. Depends on functions, nodetype and ports."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def build_list(*items: Any) -> list[Any]:
 
 @node(inputs={"lists": Inputs(Sequence[Any], 2)}, outputs=list[Any])
 def merge_lists(*lists: Sequence[Any]) -> list[Any]:
-    """Put the lists at all inputs behind each other.
+    """Concatenate the lists at all inputs.
 
     Fires once all inputs hold a token; silence at one of them is silence, and the end of one is the end.
 
@@ -81,7 +81,7 @@ def merge_lists(*lists: Sequence[Any]) -> list[Any]:
 
 @node
 def append_item(items: Sequence[T], item: T) -> list[T]:
-    """Put a value behind a list.
+    """Append a value to a list.
 
     Args:
       items: the list, which stays as it is; the answer is a new one.
@@ -120,7 +120,7 @@ def zip_lists(*lists: Sequence[Any], same_length: bool) -> list[tuple[Any, ...]]
 
 @node
 def enumerate_items(items: Sequence[T], *, start: int = 0) -> list[tuple[int, T]]:
-    """Give each item with its number.
+    """Return each item with its number.
 
     Args:
       items: a list.
@@ -141,7 +141,7 @@ def combine_lists(
     Args:
       a: the first list.
       b: the second one.
-      operation: what is in either, in both, in a alone, or in exactly one of them.
+      operation: items in either, in both, only in a, or in exactly one of them.
     """
     first, second = _unique(a), _unique(b)
     match operation:
@@ -173,7 +173,7 @@ def size(items: Collection[object]) -> int:
 
 @node
 def select_item(items: Sequence[T], *, index: int = 0) -> T:
-    """Give one item of a list; drive the parameter `index` by an edge to choose it by a stream.
+    """Return one item of a list; drive the parameter `index` by an edge to choose it by a stream.
 
     Args:
       items: a list.
@@ -191,12 +191,12 @@ def select_item(items: Sequence[T], *, index: int = 0) -> T:
 
 @node
 def slice_items(items: Sequence[T], *, start: int | None = None, stop: int | None = None, step: int = 1) -> list[T]:
-    """Give a part of a list, as `items[start:stop:step]` does.
+    """Return a part of a list, as `items[start:stop:step]` does.
 
     Args:
       items: a list.
       start: the place of the first item, from 0; negative ones count from the end; None is the beginning.
-      stop: the place behind the last item; None is the end.
+      stop: the index after the last item; None is the end.
       step: every which item; negative ones go backwards.
 
     Raises:
@@ -218,7 +218,7 @@ def chunk_items(items: Sequence[T], *, length: Annotated[int, Interval(ge=1)] = 
 
 @node
 def windows(items: Sequence[T], *, length: Annotated[int, Interval(ge=1)] = 2) -> list[list[T]]:
-    """Give all neighbours of a list, so many at a time; nothing of a list that is shorter.
+    """Return all windows of consecutive items of a list; none if the list is shorter than a window.
 
     Args:
       items: a list.
@@ -248,7 +248,7 @@ def _opened(items: Iterable[Any], depth: int) -> Iterable[Any]:
 
 @node
 def pluck(items: Sequence[Any], *, field: str = "") -> list[Any]:
-    """Give the same field of each item.
+    """Return the same field of each item.
 
     Args:
       items: a list of dicts, records or lists.
@@ -293,7 +293,7 @@ def sort_items(items: Sequence[Any], *, field: str = "", descending: bool = Fals
 
 @node
 def min_by(items: Sequence[Any], *, field: str = "") -> Any:
-    """Give the item whose field is the smallest, the first of several; silent for an empty list.
+    """Return the item whose field is the smallest, the first of several; silent for an empty list.
 
     Args:
       items: a list.
@@ -309,7 +309,7 @@ def min_by(items: Sequence[Any], *, field: str = "") -> Any:
 
 @node
 def max_by(items: Sequence[Any], *, field: str = "") -> Any:
-    """Give the item whose field is the largest, the first of several; silent for an empty list.
+    """Return the item whose field is the largest, the first of several; silent for an empty list.
 
     Args:
       items: a list.
@@ -326,11 +326,11 @@ def max_by(items: Sequence[Any], *, field: str = "") -> Any:
 class ShuffleItems(Node):
     """Put each list into a random order.
 
-    Every run gives the same ones, and so do two nodes with the same seed.
+    Every run sends the same ones, and so do two nodes with the same seed.
 
     Attributes:
       items: a list.
-      seed: begins another row of orders; with None no two runs are alike.
+      seed: another seed gives other orders; with None, every run has different ones.
       shuffled: the list in its new order.
     """
 
@@ -352,7 +352,7 @@ class ShuffleItems(Node):
 
 
 def _unique(items: Iterable[Any]) -> list[Any]:
-    """Give each of equal items once, the first; those that have no hash are compared one by one."""
+    """Return each of equal items once, the first; those that have no hash are compared one by one."""
     found: list[Any] = []
     seen: set[Any] = set()
     others: list[Any] = []
@@ -375,7 +375,7 @@ def _is_in(item: Any, items: Iterable[Any]) -> bool:
 
 @node
 def unique_items(items: Sequence[T]) -> list[T]:
-    """Give each of equal items once, in the order in which they first come.
+    """Return each of equal items once, in the order in which they first come.
 
     Args:
       items: a list.
@@ -396,7 +396,7 @@ def contains_item(items: Collection[object], item: object) -> bool:
 
 @node
 def index_of(items: Sequence[object], item: object) -> int | None:
-    """Give the place of a value in a list, from 0, the first of several; silent if it is not there.
+    """Return the place of a value in a list, from 0, the first of several; silent if it is not there.
 
     Args:
       items: a list.
@@ -488,14 +488,14 @@ def group_by(items: Sequence[Any], *, field: str = "") -> Mapping[Any, list[Any]
 class EachItem(Node):
     """Signal each item of a list, then that this was all.
 
-    All signals of a list leave in one firing, in order; the queue of an edge into an input makes room for them. To
-    send each item *through* nodes and have a list of what came out, use a subgraph that iterates instead (rule G4):
-    that keeps step with the stream.
+    All signals of a list leave in one firing, in order; the queue of an edge into an input makes room for them. To send
+    each item *through* nodes and have a list of what came out, use a subgraph that iterates instead (rule G4): that
+    keeps step with the stream.
 
     Attributes:
       items: a list.
       item: each of its items.
-      done: how many they were, behind the last one.
+      done: how many they were, after the last one.
     """
 
     items = Input(Collection[Any])
@@ -510,15 +510,15 @@ class EachItem(Node):
 
 
 class CollectItems(Node):
-    """Make a list of signals, until somebody says that this was all.
+    """Collect signals into a list, until `finish`.
 
-    With `EachItem.done` at `finish` it undoes what EachItem does. What is collected when the run ends is given by
-    nobody: finish first.
+    With `EachItem.done` at `finish` it undoes what EachItem does. A list that is incomplete when the run ends is not
+    sent: finish first.
 
     Attributes:
-      item: each value is put behind the list.
+      item: each value is appended to the list.
       finish: gives the list and begins a new one.
-      at: gives the list also as soon as it has so many items; 0 waits for `finish`.
+      at: also send the list as soon as it has this number of items; 0 waits for `finish`.
       collected: the list.
     """
 
@@ -528,17 +528,17 @@ class CollectItems(Node):
 
     @slot
     def item(self, value: Any) -> None:
-        """Put it behind the list."""
+        """Append it to the list."""
         self.so_far.append(value)
         if len(self.so_far) == self.at:
             self.finish_now()
 
     @slot
     def finish(self) -> None:
-        """Give the list."""
+        """Send the list."""
         self.finish_now()
 
     def finish_now(self) -> None:
-        """Give the list and begin a new one."""
+        """Send the list and begin a new one."""
         done, self.so_far = self.so_far, []
         self.collected.trigger(done)

@@ -1,4 +1,4 @@
-"""Dicts, records and tuples: composed, decomposed, looked up. Stands on functions, nodetype and ports."""
+"""Dicts, records and tuples: composed, decomposed, looked up. Depends on functions, nodetype and ports."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ MapOrFunction: TypeAlias = Mapping[Any, Any] | Callable[[Any], Any]
 class MapLookup(Node):
     """Look a key up in a map, as in Fig. 18 of the paper; signal if it is not there.
 
-    The map comes in step with the key, by the input, or whenever it has changed, by the slot; the one that came last
-    is used. A value of None, as a map of known poses has it for those that are not known, counts as not there. Active
-    edges behind `found` and `unknown` lead activity to what follows in either case.
+    The map comes in step with the key, by the input, or whenever it has changed, by the slot; the one that came last is
+    used. A value of None, as a map of known poses has it for those that are not known, counts as not there. Active
+    edges from `found` and `unknown` carry activity to the next node in either case.
 
     Attributes:
       key: what is looked up.
@@ -119,7 +119,7 @@ class Compose(Node):
 
 
 class Decompose(Node):
-    """Give each part of a tuple, list or record at an output of its own.
+    """Send each part of a tuple, list or record at an output of its own.
 
     A part that is None is silence.
 
@@ -151,7 +151,7 @@ class Decompose(Node):
 
 
 def parts_of(value: Any) -> list[Any]:
-    """Give the parts of a value.
+    """Return the parts of a value.
 
     Raises:
       TypeError: it has none.
@@ -191,7 +191,7 @@ class ComposeDict(Node):
 
 
 class DecomposeDict(Node):
-    """Give the values of several keys of a dict, or fields of a record, at an output each.
+    """Send the values of several keys of a dict, or fields of a record, at an output each.
 
     What is not there, or None, is silence; `missing` tells of it.
 
@@ -239,7 +239,7 @@ def need_keys(keys: Sequence[str], count: int, ports: str) -> None:
 
 @node
 def key_value(value: Any, *, key: str = "key") -> tuple[str, Any]:
-    """Give a value with a name, as a pair; see dict_of_pairs.
+    """Return a value with a name, as a pair; see dict_of_pairs.
 
     Args:
       value: anything.
@@ -310,7 +310,7 @@ def pairs_of(mapping: Mapping[Any, Any]) -> list[tuple[Any, Any]]:
 
 @node
 def get_field(value: Any, *, field: str = "") -> Any:
-    """Give what a key, field or number of a value holds; None in it is silence.
+    """Return what a key, field or number of a value holds; None in it is silence.
 
     Args:
       value: a dict, list, tuple, dataclass, NamedTuple, struct or attrs class.
@@ -324,7 +324,7 @@ def get_field(value: Any, *, field: str = "") -> Any:
 
 @node
 def set_key(mapping: Mapping[Any, Any], value: Any, *, key: str = "key") -> dict[Any, Any]:
-    """Give a dict in which one key has another value, or is new.
+    """Return a dict in which one key has another value, or is new.
 
     Args:
       mapping: the dict, which stays as it is; the answer is a new one.
@@ -358,7 +358,7 @@ def without_keys(mapping: Mapping[str, Any], *, keys: Sequence[str] = ()) -> dic
 
 @node
 def rename_keys(mapping: Mapping[str, Any], *, names: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """Give keys of a dict other names; a name that is there already is lost to the later of both.
+    """Return keys of a dict other names; a name that is there already is lost to the later of both.
 
     Args:
       mapping: a dict.

@@ -5,9 +5,9 @@
     graph.add(cv.gaussian_blur(ksize=(7, 7)))
 
 Names are OpenCV's in snake case; its own are understood too, `cv.GaussianBlur`. Arrays are inputs, numbers are
-parameters, constants are words: `border_type="REFLECT"`. An image of a kind that a function does not take is refused
-with a sentence before OpenCV sees it, for some functions would end the process. A type is made when it is first named.
-`categories()` groups the names, `not_nodes()` says which functions are no nodes and why.
+parameters, constants are words: `border_type="REFLECT"`. An image of a type that a function does not accept is refused
+before OpenCV sees it, because some functions would end the process. A type is made when it is first named.
+`categories()` groups the names, `not_nodes()` says which functions are not nodes and why.
 
     _stub        functions, their arguments and constants, from the type stub
     _docs        what the docstrings say of them
@@ -35,7 +35,7 @@ __all__ = sorted(["categories", "not_nodes", *_recipes.names()])
 
 
 def categories() -> dict[str, tuple[str, ...]]:
-    """Give the names of the node types in each category; what no table knows is under "other"."""
+    """Return the names of the node types in each category; what no table knows is under "other"."""
     ours = {theirs: name for name, theirs in _recipes.names().items()}
     found = {category: tuple(ours[name] for name in names if name in ours) for category, names in CATEGORIES.items()}
     known = {name for names in found.values() for name in names}
@@ -44,7 +44,7 @@ def categories() -> dict[str, tuple[str, ...]]:
 
 
 def not_nodes() -> dict[str, str]:
-    """Give OpenCV's functions that are no node types, with the reason."""
+    """Return OpenCV's functions that are no node types, with the reason."""
     found = {name: _recipes.refused(name) for name in overloads()}
     return {name: reason for name, reason in sorted(found.items()) if reason is not None}
 
@@ -70,7 +70,7 @@ def __dir__() -> list[str]:
 
 def _hint(name: str) -> str:
     reason = _recipes.refused(name) if name in overloads() else None
-    return "" if reason is None else f"; cv2.{name} is no node: {reason}"
+    return "" if reason is None else f"; cv2.{name} is not a node type: {reason}"
 
 
 _OURS = {theirs: name for name, theirs in _recipes.names().items()}

@@ -1,6 +1,6 @@
 """Runs one firing of a node for a function of OpenCV: checks and converts what comes, and tells what OpenCV refuses.
 
-Stands on `_overrides`, which say what becomes of an argument.
+Depends on `_overrides`, which say what becomes of an argument.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Calling:
       knobs: what its parameters are for it.
       given: arguments that are always the same.
       deadly: kinds of pixels and numbers of channels that end the process.
-      results: the types of what it gives back, in the words of OpenCV's stub.
+      results: types of its results, in the terms of OpenCV's stub.
       is_single: what it gives back is what is sent; else it is a tuple with something for each output.
     """
 
@@ -133,7 +133,7 @@ class Calling:
             arguments[knob.argument] = value if knob.say.convert is None else knob.say.convert(value, inputs)
 
     def _shaped(self, result: Any) -> Any:
-        """Give the result as declared: OpenCV gives tuples where lists are meant."""
+        """Return the result as declared: OpenCV gives tuples where lists are meant."""
         if self._is_single:
             return _listed(result, self._results[0]) if 0 in self._lists else result
         if not self._lists:
@@ -144,7 +144,7 @@ class Calling:
 
 
 def _handed(value: Any, inlet: Inlet) -> Any:
-    """Give what OpenCV may read a little beyond, and write to if it does."""
+    """Return what OpenCV may read a little beyond, and write to if it does."""
     if isinstance(value, np.ndarray):
         return copy_with_room(value) if inlet.copied else with_room(value)
     if isinstance(value, list):

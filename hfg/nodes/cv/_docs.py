@@ -18,11 +18,11 @@ _LONGEST = 320
 
 
 class Documentation(NamedTuple):
-    """What is said of one way to call a function.
+    """The documentation of one overload of a function.
 
     Attributes:
-      outputs: names of what it gives back; empty for nothing.
-      about: what it does, one sentence; empty if nothing is said.
+      outputs: names of its results; empty if there is none.
+      about: what it does, in one sentence; empty if undocumented.
       arguments: what is said of each argument, and of each output that is one.
       returned: what is said of the value that has no name.
     """
@@ -34,7 +34,7 @@ class Documentation(NamedTuple):
 
 
 def read(function: Any, arguments: Iterable[str]) -> Documentation:
-    """Give what is said of the way to call the function with these arguments; the other ways fill what is missing."""
+    """Return the documentation of the overload with these arguments, completed from the other overloads."""
     blocks = _blocks(getattr(function, "__doc__", None) or "")
     wanted = tuple(arguments)
     blocks.sort(key=lambda block: block[0] != wanted)  # a stable sort: the one that is asked for comes first
@@ -54,7 +54,7 @@ def read(function: Any, arguments: Iterable[str]) -> Documentation:
 
 
 def _blocks(text: str) -> list[tuple[tuple[str, ...], tuple[str, ...], str]]:
-    """Give arguments, outputs and text of each way to call the function."""
+    """Return arguments, outputs and text of each way to call the function."""
     blocks: list[tuple[tuple[str, ...], tuple[str, ...], list[str]]] = []
     for line in text.splitlines():
         signature = None if line.startswith(".") else _SIGNATURE.match(line.strip())
@@ -76,7 +76,7 @@ def _parts(text: str) -> list[tuple[str, str]]:
 
 
 def _sentences(text: str, count: int = 3) -> str:
-    """Give the first sentences without markup, in one line that is not too long."""
+    """Return the first sentences without markup, in one line that is not too long."""
     plain = re.sub(r"\\f\[.*?\\f\]", "", text.split("\n\n")[0], flags=re.DOTALL)
     plain = re.sub(r"\\f\$(.*?)\\f\$", lambda found: _formula(found[1]), plain, flags=re.DOTALL)
     plain = re.sub(r"@cite \w+|\[\[?@?\w*\]?\]\(.*?\)|!\[.*?\]\(.*?\)", "", plain)

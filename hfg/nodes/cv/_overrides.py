@@ -1,6 +1,6 @@
 """What neither the stub nor the documentation of OpenCV says: kinds of arrays, defaults, limits and choices.
 
-An argument is looked up under its function first, then under its name alone. Names are OpenCV's own. A test calls every
+An argument is looked up under its function first, then only under its name. Names are OpenCV's own. A test calls every
 function with each default of ours and without it: both give the same.
 """
 
@@ -31,14 +31,14 @@ Convert: TypeAlias = Callable[[Any, Mapping[str, Any]], Any]
 
 
 class Say(NamedTuple):
-    """What is said of one argument.
+    """Declarations about one argument.
 
     Attributes:
       hint: its type; None to take the stub's.
-      default: REQUIRED if nothing is said of it.
+      default: REQUIRED if there is no declaration.
       convert: makes OpenCV's argument of the value.
-      port: it is an input, although it is no array.
-      drop: nobody needs to give it, OpenCV makes it.
+      port: it is an input, although it is not an array.
+      drop: it is omitted; OpenCV makes it.
       given: what OpenCV is given for an argument that is dropped but that it wants to have.
     """
 
@@ -170,7 +170,7 @@ _DTYPES: Final = {"same": -1, "uint8": 0, "int8": 1, "uint16": 2, "int16": 3, "i
 
 
 def _dtype(default: str, *allowed: str) -> Say:
-    """What a pixel of the result holds."""
+    """The type of the result's pixels."""
     words = allowed or ("same", "uint8", "uint16", "int16", "float32", "float64")
     return Say(Literal[tuple(words)], default, lambda value, inputs: _DTYPES[value])
 
@@ -180,7 +180,7 @@ def _sizes(default: Any, *, odd: bool = False) -> Say:
 
 
 def _criteria(count: int, epsilon: float) -> Say:
-    """How many rounds at most, and what change is small enough to stop."""
+    """Return how many rounds at most, and what change is small enough to stop."""
     both = cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS
     return Say(
         Annotated[tuple[int, float], Predicate(rounds_are_few)],
@@ -252,7 +252,7 @@ def _in_a_list(value: Any, inputs: Mapping[str, Any]) -> Any:
 
 
 def _in_columns(value: Any, inputs: Mapping[str, Any]) -> Any:
-    """Give points as OpenCV takes a single one, too: n x 2 numbers are n x 1 pairs."""
+    """Return points as OpenCV takes a single one, too: n x 2 numbers are n x 1 pairs."""
     return np.reshape(value, (-1, 1, value.shape[-1]))
 
 
@@ -262,7 +262,7 @@ def _among_rows(value: Any, inputs: Mapping[str, Any]) -> Any:
 
 
 def _painted(value: Colour, inputs: Mapping[str, Any]) -> tuple[float, ...]:
-    """Give a colour as the picture has it: how light it is where there is one channel, else blue, green, red."""
+    """Return a colour as the picture has it: how light it is where there is one channel, else blue, green, red."""
     shape = _first(inputs).shape
     if len(shape) == 2 or shape[2] == 1:
         return (0.299 * value.red + 0.587 * value.green + 0.114 * value.blue,)
@@ -1001,7 +1001,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
 
 
 class Need(NamedTuple):
-    """What the values of a firing need besides their types, because OpenCV ends the process for it or never comes back.
+    """A requirement on the values of a firing beyond their types; without it OpenCV ends the process or never returns.
 
     Attributes:
       says: when it is not met, as a part of a sentence, for the documentation.
@@ -1056,7 +1056,7 @@ def _size_of(kernel: Any) -> tuple[int, int]:
 
 
 def _power_fits(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
-    """OpenCV takes integers for float64 when the power is none, and writes beyond the picture."""
+    """OpenCV takes integers for float64 when the power is not an integer, and writes beyond the picture."""
     power = parameters["power"]
     if inputs["src"].dtype in (np.float32, np.float64) or (float(power).is_integer() and abs(power) < 2**31):
         return None
@@ -1126,7 +1126,7 @@ def _disparities_are_of_the_range(inputs: Mapping[str, Any], parameters: Mapping
 
 
 def _labels_are_few(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
-    """OpenCV marks pixels of 32 bits by their highest bits, and follows marks that are none beyond the image."""
+    """OpenCV marks pixels of 32 bits by their highest bits, and follows invalid marks beyond the image."""
     image = inputs["image"]
     if image.dtype != np.int32 or (image.min() >= 0 and image.max() <= 2**29):
         return None

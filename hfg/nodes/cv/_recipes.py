@@ -1,8 +1,8 @@
 """Turns functions of OpenCV into recipes for node types: what is an input, what a parameter, what an output.
 
-An array that must be given is an input, a number is a parameter; arrays that OpenCV could write into are left out, and
-what it writes into in any case is copied first, for values on edges are never changed (T1). Which kinds of pixels a
-function takes has been measured (`_measured.json`), because some of them end the process.
+An array that must be given is an input, a number is a parameter; arrays that OpenCV could write into are omitted, and
+arrays that it writes into in any case are copied first, because values on edges are never changed (T1). Which kinds of
+pixels a function takes has been measured (`_measured.json`), because some of them end the process.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ class ResultKind(msgspec.Struct, frozen=True):
 
 
 class Measured(msgspec.Struct, frozen=True):
-    """What a function did with images of every kind.
+    """The measured behaviour of a function with images of every type.
 
     Attributes:
       dtypes: kinds of pixels that it takes.
       channels: how many channels.
-      deadly: pairs of them that end the process although each alone is fine.
+      deadly: pairs of them that end the process although each by itself is fine.
       results: what came out, in order.
     """
 
@@ -65,7 +65,7 @@ class _Table(msgspec.Struct, frozen=True):
 
 @functools.cache
 def measured() -> Mapping[str, Measured]:
-    """Give the checked-in table, by OpenCV's names; what it lacks takes images of 8 bits only."""
+    """Return the checked-in table, by OpenCV's names; what it lacks takes images of 8 bits only."""
     data = files("hfg.nodes.cv").joinpath("_measured.json").read_bytes()
     return msgspec.json.decode(data, type=_Table).functions
 
@@ -103,7 +103,7 @@ _RESULTS: Final[Mapping[str, Any]] = {
 
 @functools.cache
 def names() -> Mapping[str, str]:
-    """Give OpenCV's name for the name of each node type, in alphabetical order."""
+    """Return OpenCV's name for the name of each node type, in alphabetical order."""
     found = {port_name(name): name for name in overloads() if refused(name) is None}
     return dict(sorted(found.items()))
 
@@ -116,7 +116,7 @@ def refused(name: str) -> str | None:
     if not any(_is_input(one, _say(name, one)) for one in overload.arguments if not one.optional):
         return "it takes no array, so it would be a source without end"
     if overload.returns == "None":
-        return "it gives nothing back"
+        return "it returns nothing"
     for argument in overload.arguments:
         say = _say(name, argument)
         known = argument.type in (*_ARRAYS, *_LISTS, *_VALUES) or say.hint is not None or say.drop or argument.optional
@@ -126,7 +126,7 @@ def refused(name: str) -> str | None:
 
 
 def chosen(name: str) -> Overload:
-    """Give the way to call a function that its node takes."""
+    """Return the way to call a function that its node takes."""
     return overloads()[name][OVERLOADS.get(name, 0)]
 
 
@@ -200,7 +200,7 @@ def _refusals(name: str) -> str:
 
 
 def _sure(results: Sequence[ResultKind], inlets: Sequence[Inlet]) -> Sequence[ResultKind]:
-    """Take off what was the same each time only because the samples were: pictures of a type that is said by hand."""
+    """Remove facts that were constant only because the samples were: pictures of a type that is declared by hand."""
     facts = [array_facts(inlet.port.hint) for inlet in inlets if not inlet.is_image]
     if not any(
         one is not None
@@ -265,7 +265,7 @@ def _knob(function: str, argument: Argument, say: Say, told: Documentation) -> K
 
 
 def _image_hint(found: Measured) -> Any:
-    """Give the type of the images that a function takes, as it was measured."""
+    """Return the type of the images that a function takes, as it was measured."""
     scalars = tuple(getattr(np, "bool_" if name == "bool" else name) for name in found.dtypes)
     if found.dtypes == ("uint8",):
         if found.channels == (1,):

@@ -1,4 +1,4 @@
-"""Makes room around arrays: OpenCV's vector instructions read some bytes before and behind them.
+"""Makes room around arrays: OpenCV's vector instructions read some bytes before and after them.
 
 In ordinary memory something is there. At the ends of a mapping, as of shared memory or of a file, is nothing, and a
 read there ends the process. Knows no functions of OpenCV.
@@ -25,7 +25,7 @@ def with_room(array: Any) -> Any:
 
 
 def copy_with_room(array: Any, rows: int = 0) -> Any:
-    """Copy an array to where some bytes are around it, and so many of its rows."""
+    """Copy an array to memory with some bytes, and `rows` rows, around it."""
     beside = _BEHIND + (rows and rows * array[0].size)
     room = np.zeros(array.size + 2 * beside, array.dtype)
     room[beside : beside + array.size] = array.reshape(-1)

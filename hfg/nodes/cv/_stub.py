@@ -43,7 +43,7 @@ def _text() -> str:
 
 @functools.cache
 def overloads() -> Mapping[str, tuple[Overload, ...]]:
-    """Give every function of the module with the ways to call it that take arrays, in the order of the stub."""
+    """Return every function of the module with the ways to call it that take arrays, in the order of the stub."""
     found: dict[str, tuple[Overload, ...]] = {}
     for name, arguments, returns in _FUNCTION.findall(_text()):
         if "UMat" in arguments or "GpuMat" in arguments or "UMat" in returns:
@@ -55,7 +55,7 @@ def overloads() -> Mapping[str, tuple[Overload, ...]]:
 
 @functools.cache
 def enumerations() -> Mapping[str, tuple[str, ...]]:
-    """Give the names of the constants of each enumeration."""
+    """Return the names of the constants of each enumeration."""
     return {name: tuple(constants.split(", ")) for name, constants in _ENUMERATION.findall(_text())}
 
 

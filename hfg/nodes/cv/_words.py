@@ -137,7 +137,7 @@ NO_NODES: Final[Mapping[str, str]] = {
     "estimateChessboardSharpness": "its corners belong to one picture and board: hfg.nodes.vision:ChessboardFinder",
     "find4QuadCornerSubpix": "corner_sub_pix does it for all corners",
     "broadcast": "numpy does that: np.broadcast_to",
-    "denoise_TVL1": "it gives nothing back",
+    "denoise_TVL1": "it returns nothing",
     "mixChannels": "it writes into several arrays at once; split and merge do that",
     "filterHomographyDecompByVisibleRefpoints": "it takes several lists that depend on each other",
 }

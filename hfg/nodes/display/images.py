@@ -1,6 +1,6 @@
 """Images for people to look at: the newest one in a file, and several in one.
 
-Stands on files, nodetype, functions and ports.
+Depends on files, nodetype, functions and ports.
 """
 
 from __future__ import annotations
@@ -25,21 +25,20 @@ __all__ = ["ImageDisplay", "image_grid", "visible"]
 class ImageDisplay(Node):
     """Show the newest image in a file, which a viewer that looks after it, or a browser, shows to people.
 
-    The file is the old image or the new one, never half of each. With a limit of the rate the images between are left
-    out, but the last one is written when the stream ends. It writes while the loop waits, some ten milliseconds for
-    each million pixels; put it into a thread group where that is too long. Needs OpenCV. To keep every image use
-    `files.WriteImage`.
+    The file is replaced only as a whole. With a limit of the rate the images between are left out, but the last one is
+    written when the stream ends. Writing blocks the loop for about ten milliseconds per million pixels; put the node
+    into a thread group if that is too long. Needs OpenCV. To keep every image use `files.WriteImage`.
 
     Attributes:
       image: with 1 channel, 3 (blue, green and red) or 4. Anything but 8 bits is shown from its smallest to its largest
         number, as from black to white.
-      path: of the file, such as PNG or JPEG; relative ones begin in the working directory.
+      path: path of the file, such as PNG or JPEG; relative paths start in the working directory.
       quality: of JPEG and WebP, 1 to 100.
-      most_per_s: how many images are written in a second at most; 0 writes all.
-      shown: the path, when the file is there.
+      most_per_s: maximum number of images written per second; 0 writes all.
+      shown: the path, after the file was written.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
       ValueError: the format does not take such an image.
       ModuleNotFoundError: OpenCV is not installed.
 
@@ -75,7 +74,7 @@ class ImageDisplay(Node):
 
 
 def visible(image: AnyImage) -> Image:
-    """Give an image of 8 bits of any image: other numbers from the smallest, black, to the largest, white."""
+    """Return an image of 8 bits of any image: other numbers from the smallest, black, to the largest, white."""
     if image.dtype == np.uint8:
         return image
     if image.dtype == bool:
@@ -98,14 +97,14 @@ def visible(image: AnyImage) -> Image:
     parameters={"columns": Parameter(0, Interval(ge=0)), "gap": Parameter(4, Interval(ge=0, le=1000))},
 )
 def image_grid(*images: AnyImage, columns: int, gap: int) -> Image:
-    """Put the images at all inputs beside and below each other.
+    """Put the images at all inputs into a grid.
 
     Each has a field as large as the largest one, and stands in its middle. Anything but 8 bits is shown from its
     smallest to its largest number. The grid has colours if any image has; how opaque an image is is left out.
 
     Args:
       images: any number of images.
-      columns: how many stand beside each other; 0 makes about as many rows as columns.
+      columns: number of columns; 0 makes about as many rows as columns.
       gap: pixels of grey between two of them.
 
     Raises:
@@ -126,7 +125,7 @@ def image_grid(*images: AnyImage, columns: int, gap: int) -> Image:
 
 
 def _channels(image: Image) -> Image:
-    """Give an image with an axis of channels: 1 or 3 of them."""
+    """Return an image with an axis of channels: 1 or 3 of them."""
     if image.ndim == 2:
         return image[..., np.newaxis]
     if image.shape[2] == 2:

@@ -1,6 +1,6 @@
 """Numbers as pictures: over time, against each other, counted. Needs matplotlib, and no screen.
 
-Stands on nodetype, ports and numpy.
+Depends on nodetype, ports and numpy.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class _Plot(Node):
         return self._picture() if self.every and self.since >= self.every else None
 
     def end(self) -> None:
-        """Give the last picture, if there is anything that no picture shows yet."""
+        """Send the last picture, if there is anything that no picture shows yet."""
         if self.since:
             self.plot.send(self._picture())
 
@@ -91,7 +91,7 @@ class _Plot(Node):
 
 
 def finite(values: Any) -> Any:
-    """Give numbers that can be drawn: what is infinite, or too large for a picture, is left out."""
+    """Return numbers that can be drawn: what is infinite, or too large for a picture, is left out."""
     array = np.asarray(values if isinstance(values, np.ndarray) else list(values), dtype=np.float64)
     return np.where(np.abs(array) < 1e300, array, np.nan)
 
@@ -99,26 +99,26 @@ def finite(values: Any) -> Any:
 class TimePlot(_Plot):
     """Draw numbers over time.
 
-    Each token has the time of its stamp. A picture is drawn after every so many tokens and when the stream ends, or the
-    run is stopped; it takes some ten milliseconds, so put the node into a thread group. Needs matplotlib.
+    Each token has the time of its stamp. A picture is drawn after every `every` tokens, and when the stream ends or the
+    run is stopped. Drawing takes some ten milliseconds, so put the node into a thread group. Needs matplotlib.
 
     Attributes:
       value: a number; or several, which make a line each: then all tokens have as many.
-      path: of the file, PNG, SVG or PDF, that has the newest picture; "" writes none.
-      every: after how many tokens a picture is drawn; 0 draws one at the end.
+      path: path of the file, PNG, SVG or PDF, for the newest picture; "" writes none.
+      every: number of tokens per picture; 0 draws only one, at the end.
       points: how many of the last tokens are shown; 0 shows and keeps all.
       relative: whether the time begins with 0 at the first token that is shown.
-      width: of the picture, in pixels.
-      height: of the picture, in pixels.
-      title: above the picture.
-      label: of the axis of the numbers.
-      forget: begins anew.
+      width: width of the picture, in pixels.
+      height: height of the picture, in pixels.
+      title: title above the picture.
+      label: label of the axis of the numbers.
+      forget: starts over.
       plot: each picture, blue, green and red.
 
     Raises:
-      ValueError: tokens have different numbers of numbers, or the path ends with no format of pictures.
+      ValueError: tokens have different numbers of numbers, or the path has no image format as its extension.
       OverflowError: a whole number is too large for a float.
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
       ModuleNotFoundError: matplotlib is not installed.
 
     CS::APEX: csapex::TimePlot.
@@ -142,7 +142,7 @@ class TimePlot(_Plot):
 
     @slot
     def forget(self) -> None:
-        """Begin anew."""
+        """Start over."""
         self.kept = deque()
 
     def _draw(self, axes: Any) -> None:
@@ -156,28 +156,28 @@ class TimePlot(_Plot):
 class ScatterPlot(_Plot):
     """Draw points by two streams of numbers.
 
-    A picture is drawn after every so many tokens and when a stream ends, or the run is stopped; it takes some ten
+    A picture is drawn after every `every` tokens, and when a stream ends or the run is stopped. Drawing takes some ten
     milliseconds, so put the node into a thread group. Needs matplotlib.
 
     Attributes:
       x: a number to the right, or several, for as many points.
       y: a number upwards, or as many.
-      path: of the file, PNG, SVG or PDF, that has the newest picture; "" writes none.
-      every: after how many tokens a picture is drawn; 0 draws one at the end.
+      path: path of the file, PNG, SVG or PDF, for the newest picture; "" writes none.
+      every: number of tokens per picture; 0 draws only one, at the end.
       points: how many of the last points are shown; 0 shows and keeps all.
       point_size: how large a point is, in pixels.
-      width: of the picture, in pixels.
-      height: of the picture, in pixels.
-      title: above the picture.
-      x_label: of the axis to the right.
-      y_label: of the axis upwards.
-      forget: begins anew.
+      width: width of the picture, in pixels.
+      height: height of the picture, in pixels.
+      title: title above the picture.
+      x_label: label of the horizontal axis.
+      y_label: label of the vertical axis.
+      forget: starts over.
       plot: each picture, blue, green and red.
 
     Raises:
-      ValueError: x and y are not as many, or the path ends with no format of pictures.
+      ValueError: x and y are not as many, or the path has no image format as its extension.
       OverflowError: a whole number is too large for a float.
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
       ModuleNotFoundError: matplotlib is not installed.
 
     CS::APEX: csapex::ScatterPlot.
@@ -203,7 +203,7 @@ class ScatterPlot(_Plot):
 
     @slot
     def forget(self) -> None:
-        """Begin anew."""
+        """Start over."""
         self.kept = deque()
 
     def _draw(self, axes: Any) -> None:
@@ -217,27 +217,27 @@ class ScatterPlot(_Plot):
 class VectorPlot(_Plot):
     """Draw the newest vectors of several streams, each as a line.
 
-    A picture is drawn after every so many tokens and when a stream ends, or the run is stopped; it takes some ten
+    A picture is drawn after every `every` tokens, and when a stream ends or the run is stopped. Drawing takes some ten
     milliseconds, so put the node into a thread group. Needs matplotlib.
 
     Attributes:
       at: where the numbers stand, to the right; without an edge they are counted from 0. It serves the vectors that are
         as long.
       vectors: any number of vectors.
-      path: of the file, PNG, SVG or PDF, that has the newest picture; "" writes none.
-      every: after how many tokens a picture is drawn; 0 draws one at the end.
+      path: path of the file, PNG, SVG or PDF, for the newest picture; "" writes none.
+      every: number of tokens per picture; 0 draws only one, at the end.
       names: of the lines, in order.
-      width: of the picture, in pixels.
-      height: of the picture, in pixels.
-      title: above the picture.
-      x_label: of the axis to the right.
-      y_label: of the axis upwards.
+      width: width of the picture, in pixels.
+      height: height of the picture, in pixels.
+      title: title above the picture.
+      x_label: label of the horizontal axis.
+      y_label: label of the vertical axis.
       plot: each picture, blue, green and red.
 
     Raises:
-      ValueError: the path ends with no format of pictures.
+      ValueError: the path has no image format as its extension.
       OverflowError: a whole number is too large for a float.
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
       ModuleNotFoundError: matplotlib is not installed.
 
     CS::APEX: csapex::VectorPlot.
@@ -271,26 +271,26 @@ class VectorPlot(_Plot):
 class HistogramPlot(_Plot):
     """Draw how many numbers of a stream fell into each of several ranges.
 
-    A picture is drawn after every so many tokens and when the stream ends, or the run is stopped; it takes some ten
-    milliseconds, so put the node into a thread group. Needs matplotlib.
+    A picture is drawn after every `every` tokens, and when the stream ends or the run is stopped. Drawing takes some
+    ten milliseconds, so put the node into a thread group. Needs matplotlib.
 
     Attributes:
       value: a number, or several.
-      path: of the file, PNG, SVG or PDF, that has the newest picture; "" writes none.
-      every: after how many tokens a picture is drawn; 0 draws one at the end.
+      path: path of the file, PNG, SVG or PDF, for the newest picture; "" writes none.
+      every: number of tokens per picture; 0 draws only one, at the end.
       points: how many of the last numbers are counted; 0 counts and keeps all.
       bins: how many ranges, all equal, from the smallest number to the largest.
-      width: of the picture, in pixels.
-      height: of the picture, in pixels.
-      title: above the picture.
-      label: of the axis of the numbers.
-      forget: begins anew.
+      width: width of the picture, in pixels.
+      height: height of the picture, in pixels.
+      title: title above the picture.
+      label: label of the axis of the numbers.
+      forget: starts over.
       plot: each picture, blue, green and red.
 
     Raises:
-      ValueError: the path ends with no format of pictures.
+      ValueError: the path has no image format as its extension.
       OverflowError: a whole number is too large for a float.
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
       ModuleNotFoundError: matplotlib is not installed.
     """
 
@@ -309,7 +309,7 @@ class HistogramPlot(_Plot):
 
     @slot
     def forget(self) -> None:
-        """Begin anew."""
+        """Start over."""
         self.kept = deque()
 
     def _draw(self, axes: Any) -> None:

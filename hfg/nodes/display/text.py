@@ -1,6 +1,6 @@
 """Values for people to read: on the terminal, in the log, as tables and lights.
 
-Stands on nodetype, functions and ports.
+Depends on nodetype, functions and ports.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ _LEVELS: Final[dict[str, int]] = {
 
 
 class TextDisplay(Node):
-    """Show values as text, on the terminal or in the log, not more often than somebody can read.
+    """Show values as text, on the terminal or in the log, not more often than a person can read.
 
-    Values come in step with a stream by the input, or at any time by the slot. With a limit of the rate the newest
-    value is shown once its turn comes with another one, and the last one of the input when that ends; how many were not
-    shown stands behind it.
+    Values come in step with a stream by the input, or at any time by the slot. With a limit of the rate, the newest
+    value is shown when its turn comes, and the last one when the input ends; the text is followed by the number of
+    values that were not shown.
 
     Attributes:
       value: anything.
@@ -45,7 +45,7 @@ class TextDisplay(Node):
       format: the text, with {} for the value, {path} for the node's path and {time} for the seconds of the run's clock.
       to: "output" and "error" are the streams of the program, "log" is the node's log.
       level: of the log.
-      most_per_s: how many values are shown in a second at most; 0 shows all.
+      most_per_s: maximum number of values shown per second; 0 shows all.
       longest: how many characters of a text are shown.
       shown: the text, when it is shown.
 

@@ -1,6 +1,6 @@
-"""Reaching files: what goes wrong in one sentence, and whole files that are old or new, never half of each.
+"""Access to files: errors in one message, and files that are replaced only as a whole.
 
-Stands on `whole` and bounds.
+Depends on `whole` and bounds.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from hfg.base.bounds import FILE_BYTES
 __all__ = ["FilePath", "find_files", "is_a_path", "lines_of", "named", "reaching", "read_whole", "write_whole"]
 
 FilePath: TypeAlias = str | Path
-"""Where a file is; relative ones begin in the working directory of the program."""
+"""Where a file is; relative paths start in the working directory of the program."""
 
 _REASONS: Final = {
     errno.ENOENT: "there is no such file or directory",
@@ -44,7 +44,7 @@ def is_a_path(path: FilePath) -> bool:
 
 
 def named(path: FilePath) -> Path:
-    """Give the path that a parameter holds.
+    """Return the path that a parameter holds.
 
     Raises:
       ValueError: it was not set.
@@ -56,7 +56,7 @@ def named(path: FilePath) -> Path:
 
 @contextmanager
 def reaching(path: FilePath, doing: Literal["read", "write"]) -> Iterator[None]:
-    """Say in one sentence which file could not be read or written, and why.
+    """Report in one message which file could not be read or written, and why.
 
     Raises:
       OSError: of the same class as the system's.
@@ -101,10 +101,10 @@ def lines_of(file: IO[AnyStr], path: Path) -> Iterator[AnyStr]:
 
 
 def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool = True) -> None:
-    """Write a file as `hfg.base.whole.write_whole` does. Directories that are missing are made.
+    """Write a file as `hfg.base.whole.write_whole` does. Missing directories are created.
 
     Raises:
-      OSError: it cannot be written; the sentence says why, and the old file is whole.
+      OSError: it cannot be written; the message says why, and the old file is unchanged.
     """
     with reaching(path, "write"):
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
 """Whether a file of numpy holds what it says, before memory is spent on it: .npy and .npz (rule L4).
 
-A header of a hundred bytes may say that a terabyte follows, and a .npz may unpack to any size. Stands on bounds.
+A header of a hundred bytes may say that a terabyte follows, and a .npz may unpack to any size. Depends on bounds.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def need_fair_arrays(path: Path, *, is_zip: bool, whole: bool) -> None:
     """Refuse a file whose arrays are not there, or are more than may be read.
 
     Args:
-      path: of the file.
+      path: path of the file.
       is_zip: it is a .npz.
       whole: all of it will be in memory at once.
 

@@ -1,8 +1,8 @@
-"""Waits for standard input without holding anybody up.
+"""Waits for standard input without blocking anything.
 
-A read of a terminal or pipe cannot be taken back. So it is done by a daemon thread, one for the process, and what it
-brings is kept here until somebody wants it. It reads when somebody waits, so nothing is taken from those who come after
-us. It reads the descriptor itself: a thread that is killed within a read of `sys.stdin` would end Python badly.
+A read of a terminal or pipe cannot be taken back. So it is done by a daemon thread, one for the process, and its input
+is kept here until it is requested. It reads when somebody waits, so nothing is taken from those who come after us. It
+reads the descriptor itself: a thread that is killed within a read of `sys.stdin` would end Python badly.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class _StandardInput:
       left: what was read and not given: the beginning of a line, or many lines.
       is_over: whether there is nothing more.
       error: why it cannot be read.
-      is_wanted: set while somebody waits for more; its thread reads then.
+      is_wanted: set while code waits for more; its thread reads then.
       waiting: who waits, and on which loop.
     """
 
@@ -44,7 +44,7 @@ class _StandardInput:
         self.thread: threading.Thread | None = None
 
     def line(self) -> bytes | None:
-        """Give the next whole line, at the end also the rest; None if there is none."""
+        """Return the next whole line, at the end also the rest; None if there is none."""
         with self.lock:
             end = self.left.find(b"\n") + 1
             if not end and self.is_over:
@@ -114,7 +114,7 @@ _STANDARD_INPUT: Final = _StandardInput()
 
 
 async def lines_of_standard_input() -> AsyncIterator[str]:
-    """Give the lines of standard input as they come, until it ends.
+    """Yield the lines of standard input as they come, until it ends.
 
     Raises:
       OSError: it cannot be read.

@@ -1,4 +1,4 @@
-"""Files read whole, one for each path that arrives. Stands on access, functions, numpy and msgspec."""
+"""Files read whole, one for each path that arrives. Depends on access, functions, numpy and msgspec."""
 
 from __future__ import annotations
 
@@ -57,16 +57,16 @@ _CASTS: Final[dict[Column, Callable[[str], Any]]] = {
 def read_text(path: FilePath, *, encoding: Encoding = "utf-8") -> str:
     r"""Read a file of text.
 
-    Line ends of all systems become "\n". It reads while the loop waits; put it into a thread group where files are
-    large or far away.
+    Line ends of all systems become "\n". Reading blocks the loop; put the node into a thread group if files are large
+    or remote.
 
     Args:
-      path: of the file; relative ones begin in the working directory.
-      encoding: how it was written.
+      path: path of the file; relative paths start in the working directory.
+      encoding: encoding of the file.
 
     Raises:
-      OSError: the file cannot be read; the sentence says why.
-      ValueError: it is no text of that encoding, or the path is no path.
+      OSError: the file cannot be read; the message says why.
+      ValueError: it is not text of that encoding, or the path is not valid.
     """
     place = named(path)
     data = io.BytesIO(read_whole(place))
@@ -78,30 +78,30 @@ def read_text(path: FilePath, *, encoding: Encoding = "utf-8") -> str:
 def read_bytes(path: FilePath) -> bytes:
     """Read a file of anything.
 
-    It reads while the loop waits; put it into a thread group where files are large or far away.
+    Reading blocks the loop; put the node into a thread group if files are large or remote.
 
     Args:
-      path: of the file; relative ones begin in the working directory.
+      path: path of the file; relative paths start in the working directory.
 
     Raises:
-      OSError: the file cannot be read; the sentence says why.
-      ValueError: the path is no path.
+      OSError: the file cannot be read; the message says why.
+      ValueError: the path is not valid.
     """
     return read_whole(named(path))
 
 
 @node
 def read_json(path: FilePath) -> Any:
-    """Read a file of JSON; `null` alone is silence.
+    """Read a JSON file; a plain `null` is silence.
 
-    It reads while the loop waits; put it into a thread group where files are large or far away.
+    Reading blocks the loop; put the node into a thread group if files are large or remote.
 
     Args:
-      path: of the file; relative ones begin in the working directory.
+      path: path of the file; relative paths start in the working directory.
 
     Raises:
-      OSError: the file cannot be read; the sentence says why.
-      ValueError: it is no JSON, or the path is no path.
+      OSError: the file cannot be read; the message says why.
+      ValueError: it is not JSON, or the path is not valid.
     """
     return json_of(read_bytes.function(path), f'"{path}"')
 
@@ -110,7 +110,7 @@ def json_of(data: bytes, what: str) -> Any:
     """Read JSON.
 
     Raises:
-      ValueError: it is none.
+      ValueError: it is not one.
     """
     try:
         return json_value(data)
@@ -130,20 +130,20 @@ def read_csv(
 ) -> list[dict[str, Any]]:
     """Read a table of comma-separated values as a list of rows, each a dict.
 
-    It reads while the loop waits; put it into a thread group where files are large or far away.
+    Reading blocks the loop; put the node into a thread group if files are large or remote.
 
     Args:
-      path: of the file; relative ones begin in the working directory.
-      delimiter: between two values of a row.
-      header: whether the first row has the names of the columns; else they are called "0", "1" ...
-      guess: whether values that look like numbers become numbers, and empty ones None; else they stay text.
+      path: path of the file; relative paths start in the working directory.
+      delimiter: the character between two values of a row.
+      header: whether the first row has the names of the columns; otherwise they are named "0", "1" ...
+      guess: whether values that look like numbers become numbers, and empty ones None; otherwise they stay text.
       columns: the types of columns that are not guessed; an empty value of a number is None.
-      encoding: how it was written.
+      encoding: encoding of the file.
 
     Raises:
-      OSError: the file cannot be read; the sentence says why.
-      ValueError: a row has more values than there are columns, or one that its column cannot have; or the path is no
-        path.
+      OSError: the file cannot be read; the message says why.
+      ValueError: a row has more values than there are columns, or one that its column cannot have; or the path is not
+        valid.
     """
     text = read_text.function(path, encoding=encoding)
     return list(rows_of(io.StringIO(text), named(path), delimiter, header, guess, columns or {}))
@@ -210,7 +210,7 @@ def load_array(path: Path, mode: Literal["r"] | None = None) -> Any:
 
     Raises:
       OSError: it cannot be read.
-      ValueError: it is no such file.
+      ValueError: it is not such a file.
     """
     with reaching(path, "read"):
         with path.open("rb") as file:  # a directory or a missing file is told by the system, not by numpy
@@ -223,21 +223,21 @@ def load_array(path: Path, mode: Literal["r"] | None = None) -> Any:
         except Exception as error:  # what numpy and zipfile raise, whatever is in a file: a dozen kinds
             if isinstance(error, OSError) and error.errno != errno.EINVAL:  # of a place before the file
                 raise
-            raise ValueError(f'"{path}" is no file of numpy without Python objects: {error}') from None
+            raise ValueError(f'"{path}" is not a numpy file without Python objects: {error}') from None
 
 
 @node
 def read_array(path: FilePath) -> Array:
     """Read an array of a `.npy` file.
 
-    It reads while the loop waits; put it into a thread group where files are large or far away.
+    Reading blocks the loop; put the node into a thread group if files are large or remote.
 
     Args:
-      path: of the file; relative ones begin in the working directory.
+      path: path of the file; relative paths start in the working directory.
 
     Raises:
-      OSError: the file cannot be read; the sentence says why.
-      ValueError: it is no such file, or holds Python objects, which are not read; or the path is no path.
+      OSError: the file cannot be read; the message says why.
+      ValueError: it is not such a file, or holds Python objects, which are not read; or the path is not valid.
     """
     found = load_array(named(path))
     if not isinstance(found, np.ndarray):
@@ -250,14 +250,14 @@ def read_array(path: FilePath) -> Array:
 def read_arrays(path: FilePath) -> dict[str, Array]:
     """Read the arrays of a `.npz` file, by their names.
 
-    It reads while the loop waits; put it into a thread group where files are large or far away.
+    Reading blocks the loop; put the node into a thread group if files are large or remote.
 
     Args:
-      path: of the file; relative ones begin in the working directory.
+      path: path of the file; relative paths start in the working directory.
 
     Raises:
-      OSError: the file cannot be read; the sentence says why.
-      ValueError: it is no such file, or holds Python objects, which are not read; or the path is no path.
+      OSError: the file cannot be read; the message says why.
+      ValueError: it is not such a file, or holds Python objects, which are not read; or the path is not valid.
     """
     place = named(path)
     found = load_array(place)
@@ -277,7 +277,7 @@ def load_image(path: FilePath, mode: Literal["color", "gray", "raw"]) -> Any:
 
     Raises:
       OSError: the file cannot be read.
-      ValueError: it is no picture.
+      ValueError: it is not a picture.
     """
     cv2 = require("cv2", "vision")
     whole = read_bytes.function(path)
@@ -289,7 +289,7 @@ def load_image(path: FilePath, mode: Literal["color", "gray", "raw"]) -> Any:
     except cv2.error:
         image = None
     if image is None:
-        raise ValueError(f'"{path}" is no picture that OpenCV can read, or it is not whole')
+        raise ValueError(f'"{path}" is not a picture that OpenCV can read, or it is incomplete')
     return image
 
 
@@ -297,16 +297,16 @@ def load_image(path: FilePath, mode: Literal["color", "gray", "raw"]) -> Any:
 def read_image(path: FilePath, *, mode: Literal["color", "gray"] = "color") -> Image:
     """Read a picture as an image of 8 bits.
 
-    It reads while the loop waits, some milliseconds for each million pixels; put it into a thread group where that is
-    too long. Needs OpenCV.
+    Reading blocks the loop for some milliseconds per million pixels; put the node into a thread group if that is too
+    long. Needs OpenCV.
 
     Args:
-      path: of the file, such as PNG, JPEG, TIFF, BMP or WebP; relative ones begin in the working directory.
+      path: path of the file, such as PNG, JPEG, TIFF, BMP or WebP; relative paths start in the working directory.
       mode: "color" gives blue, green and red, "gray" one channel.
 
     Raises:
-      OSError: the file cannot be read; the sentence says why.
-      ValueError: it is no picture, or the path is no path.
+      OSError: the file cannot be read; the message says why.
+      ValueError: it is not a picture, or the path is not valid.
       ModuleNotFoundError: OpenCV is not installed.
     """
     image: Image = load_image(path, mode)
@@ -317,15 +317,15 @@ def read_image(path: FilePath, *, mode: Literal["color", "gray"] = "color") -> I
 def read_raw_image(path: FilePath) -> AnyImage:
     """Read a picture as it was written: with its own channels, of 8 or 16 bits or real numbers, such as a depth image.
 
-    It reads while the loop waits, some milliseconds for each million pixels; put it into a thread group where that is
-    too long. Needs OpenCV.
+    Reading blocks the loop for some milliseconds per million pixels; put the node into a thread group if that is too
+    long. Needs OpenCV.
 
     Args:
-      path: of the file, such as PNG, TIFF or EXR; relative ones begin in the working directory.
+      path: path of the file, such as PNG, TIFF or EXR; relative paths start in the working directory.
 
     Raises:
-      OSError: the file cannot be read; the sentence says why.
-      ValueError: it is no picture, or the path is no path.
+      OSError: the file cannot be read; the message says why.
+      ValueError: it is not a picture, or the path is not valid.
       ModuleNotFoundError: OpenCV is not installed.
     """
     image: AnyImage = load_image(path, "raw")
@@ -343,14 +343,14 @@ def list_directory(
     """List what is in a directory, by name.
 
     Args:
-      path: of the directory; relative ones begin in the working directory.
+      path: path of the directory; relative paths start in the working directory.
       pattern: which names are listed, as a shell has it: "*.png".
       kind: whether files, directories or both are listed.
       recursive: whether directories inside are gone through too.
 
     Raises:
-      OSError: the directory cannot be read; the sentence says why.
-      ValueError: the pattern is empty or absolute, or the path is no path.
+      OSError: the directory cannot be read; the message says why.
+      ValueError: the pattern is empty or absolute, or the path is not valid.
     """
     place = named(path)
     with reaching(place, "read"):
@@ -358,6 +358,6 @@ def list_directory(
         try:
             found = list(place.rglob(pattern) if recursive else place.glob(pattern))
         except (ValueError, NotImplementedError) as error:
-            raise ValueError(f"{pattern!r:.80} is no pattern of names: {error}") from None
+            raise ValueError(f"{pattern!r:.80} is not a pattern for names: {error}") from None
         wanted = {"files": Path.is_file, "directories": Path.is_dir, "all": Path.exists}[kind]
         return sorted(str(one) for one in found if wanted(one))

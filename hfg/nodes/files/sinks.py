@@ -1,7 +1,7 @@
 """Streams as files: one file for each value, or one for all of them.
 
 A file that holds one value is the old one or the new one, never half of each. A file that grows line by line has its
-name when it is complete. Stands on access, whole, nodetype, ports and numpy.
+name when it is complete. Depends on access, whole, nodetype, ports and numpy.
 """
 
 from __future__ import annotations
@@ -71,22 +71,22 @@ class _WholeFiles(Node):
 class WriteText(_WholeFiles):
     """Write each text to a file.
 
-    A path such as "notes/{number:04}.txt" makes a file of each; one without braces has the newest text alone. A file is
-    the old one or the new one, never half of each; directories that are missing are made. It writes while the loop
-    waits until the disk has it; put it into a thread group where that is too long.
+    A path such as "notes/{number:04}.txt" makes a file per text; a path without braces always has only the newest text.
+    A file is replaced only as a whole; missing directories are created. Writing blocks the loop until the data is on
+    disk; put the node into a thread group if that takes too long.
 
     Attributes:
-      text: what is written.
-      path: of the file, with {number} for the number of the value and {time} for the seconds of the run's clock;
-        relative ones begin in the working directory.
-      encoding: how it is written.
+      text: the text to write.
+      path: path of the file, with {number} for the number of the value and {time} for the seconds of the run's clock;
+        relative paths start in the working directory.
+      encoding: encoding of the file.
       first: the number of the first value.
-      overwrite: whether a file that is there may be replaced.
-      written: the path, when the file is there.
+      overwrite: whether an existing file may be replaced.
+      written: the path, after the file was written.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
-      ValueError: no path is set, the path asks for another field, or the encoding has no bytes for a character.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
+      ValueError: no path is set, the path has another field, or the encoding cannot represent a character.
 
     CS::APEX: csapex::ExportFile.
     """
@@ -103,21 +103,21 @@ class WriteText(_WholeFiles):
 class WriteBytes(_WholeFiles):
     """Write each value of bytes to a file.
 
-    A path such as "data/{number:04}.bin" makes a file of each; one without braces has the newest alone. A file is the
-    old one or the new one, never half of each; directories that are missing are made. It writes while the loop waits
-    until the disk has it; put it into a thread group where that is too long.
+    A path such as "data/{number:04}.bin" makes a file per value; a path without braces always has only the newest
+    value. A file is replaced only as a whole; missing directories are created. Writing blocks the loop until the data
+    is on disk; put the node into a thread group if that takes too long.
 
     Attributes:
-      data: what is written.
-      path: of the file, with {number} for the number of the value and {time} for the seconds of the run's clock;
-        relative ones begin in the working directory.
+      data: the bytes to write.
+      path: path of the file, with {number} for the number of the value and {time} for the seconds of the run's clock;
+        relative paths start in the working directory.
       first: the number of the first value.
-      overwrite: whether a file that is there may be replaced.
-      written: the path, when the file is there.
+      overwrite: whether an existing file may be replaced.
+      written: the path, after the file was written.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
-      ValueError: no path is set, or the path asks for another field.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
+      ValueError: no path is set, or the path has another field.
 
     CS::APEX: csapex::ExportFile.
     """
@@ -133,23 +133,23 @@ class WriteBytes(_WholeFiles):
 class WriteJson(_WholeFiles):
     """Write each value to a file as JSON.
 
-    A path such as "poses/{number:04}.json" makes a file of each; one without braces has the newest alone. A file is the
-    old one or the new one, never half of each; directories that are missing are made. It writes while the loop waits
-    until the disk has it; put it into a thread group where that is too long.
+    A path such as "poses/{number:04}.json" makes a file per value; a path without braces always has only the newest
+    value. A file is replaced only as a whole; missing directories are created. Writing blocks the loop until the data
+    is on disk; put the node into a thread group if that takes too long.
 
     Attributes:
-      value: anything that has a form in JSON: dicts, lists, dataclasses, structs, arrays ...
-      path: of the file, with {number} for the number of the value and {time} for the seconds of the run's clock;
-        relative ones begin in the working directory.
+      value: anything that can be represented in JSON: dicts, lists, dataclasses, structs, arrays ...
+      path: path of the file, with {number} for the number of the value and {time} for the seconds of the run's clock;
+        relative paths start in the working directory.
       indent: blanks for each level, on lines of their own; 0 is one line.
       first: the number of the first value.
-      overwrite: whether a file that is there may be replaced.
-      written: the path, when the file is there.
+      overwrite: whether an existing file may be replaced.
+      written: the path, after the file was written.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
-      TypeError: the value has no form in JSON.
-      ValueError: something in it has none, no path is set, or the path asks for another field.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
+      TypeError: the value cannot be represented in JSON.
+      ValueError: part of it cannot, no path is set, or the path has another field.
 
     CS::APEX: csapex::ExportFile.
     """
@@ -169,21 +169,21 @@ class WriteJson(_WholeFiles):
 class WriteArray(_WholeFiles):
     """Write each array to a `.npy` file.
 
-    A path such as "scans/{number:04}.npy" makes a file of each; one without braces has the newest alone. A file is the
-    old one or the new one, never half of each; directories that are missing are made. It writes while the loop waits
-    until the disk has it; put it into a thread group where that is too long.
+    A path such as "scans/{number:04}.npy" makes a file per value; a path without braces always has only the newest
+    value. A file is replaced only as a whole; missing directories are created. Writing blocks the loop until the data
+    is on disk; put the node into a thread group if that takes too long.
 
     Attributes:
-      array: what is written, of any shape and dtype but Python objects.
-      path: of the file, with {number} for the number of the value and {time} for the seconds of the run's clock;
-        relative ones begin in the working directory.
+      array: the array to write, of any shape and dtype but Python objects.
+      path: path of the file, with {number} for the number of the value and {time} for the seconds of the run's clock;
+        relative paths start in the working directory.
       first: the number of the first value.
-      overwrite: whether a file that is there may be replaced.
-      written: the path, when the file is there.
+      overwrite: whether an existing file may be replaced.
+      written: the path, after the file was written.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
-      ValueError: the array holds Python objects, no path is set, or the path asks for another field.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
+      ValueError: the array holds Python objects, no path is set, or the path has another field.
 
     CS::APEX: csapex::ExportFile.
     """
@@ -204,23 +204,23 @@ def _save(file: BinaryIO, array: Array) -> None:
 class WriteArrays(_WholeFiles):
     """Write each dict of arrays to a `.npz` file.
 
-    A path such as "scans/{number:04}.npz" makes a file of each; one without braces has the newest alone. A file is the
-    old one or the new one, never half of each; directories that are missing are made. It writes while the loop waits
-    until the disk has it; put it into a thread group where that is too long.
+    A path such as "scans/{number:04}.npz" makes a file per value; a path without braces always has only the newest
+    value. A file is replaced only as a whole; missing directories are created. Writing blocks the loop until the data
+    is on disk; put the node into a thread group if that takes too long.
 
     Attributes:
       arrays: arrays by their names.
-      path: of the file, with {number} for the number of the value and {time} for the seconds of the run's clock;
-        relative ones begin in the working directory.
+      path: path of the file, with {number} for the number of the value and {time} for the seconds of the run's clock;
+        relative paths start in the working directory.
       compressed: whether it is made smaller, which takes longer.
       first: the number of the first value.
-      overwrite: whether a file that is there may be replaced.
-      written: the path, when the file is there.
+      overwrite: whether an existing file may be replaced.
+      written: the path, after the file was written.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
-      ValueError: an array holds Python objects, a name is none that such a file can have, no path is set, or the path
-        asks for another field.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
+      ValueError: an array holds Python objects, a name is not allowed in such a file, no path is set, or the path has
+        another field.
     """
 
     arrays = Input(Mapping[str, Array])
@@ -239,22 +239,22 @@ class WriteArrays(_WholeFiles):
 class WriteImage(_WholeFiles):
     """Write each image to a file, in the format that the name's end says.
 
-    A path such as "frames/{number:06}.png" makes a file of each; one without braces has the newest alone. A file is the
-    old one or the new one, never half of each; directories that are missing are made. It writes while the loop waits,
-    some ten milliseconds for each million pixels; put it into a thread group where that is too long. Needs OpenCV.
+    A path such as "frames/{number:06}.png" makes a file per value; a path without braces always has only the newest
+    value. A file is replaced only as a whole; missing directories are created. Writing blocks the loop for about ten
+    milliseconds per million pixels; put the node into a thread group if that is too long. Needs OpenCV.
 
     Attributes:
       image: with 1 channel, 3 (blue, green and red) or 4; what other pixels than 8 bits become depends on the format.
-      path: of the file, such as PNG, JPEG, TIFF, BMP or WebP, with {number} for the number of the image and {time} for
-        the seconds of the run's clock; relative ones begin in the working directory.
+      path: path of the file, such as PNG, JPEG, TIFF, BMP or WebP, with {number} for the number of the image and {time}
+        for the seconds of the run's clock; relative paths start in the working directory.
       quality: of JPEG and WebP, 1 to 100.
       first: the number of the first image.
-      overwrite: whether a file that is there may be replaced.
-      written: the path, when the file is there.
+      overwrite: whether an existing file may be replaced.
+      written: the path, after the file was written.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
-      ValueError: the format does not take such an image, or the path asks for another field.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
+      ValueError: the format does not take such an image, or the path has another field.
       ModuleNotFoundError: OpenCV is not installed.
 
     CS::APEX: csapex::ExportFile.
@@ -272,7 +272,7 @@ class WriteImage(_WholeFiles):
 
 
 def encoded(image: AnyImage, path: FilePath, quality: int) -> bytes:
-    """Give an image in the format that a name says.
+    """Return an image in the format that a name says.
 
     Raises:
       ValueError: there is no such format, or it does not take such an image.
@@ -343,21 +343,21 @@ class _GrowingFile(Node):
 class WriteLines(_GrowingFile):
     """Write texts to a file, a line each.
 
-    Lines go into a file beside it, `<name>.part`, which takes the name when the stream ends or the run is over; so a
-    file of this name is complete. With `append` they go behind those that the file has. The system has each line at
-    once; with `flush` off many together, which is faster. A line takes microseconds; put the node into a thread group
-    where the disk is slow.
+    Lines go into `<name>.part`, which is renamed when the stream ends or the run is over; so a file with the final name
+    is complete. With `append`, lines are added to an existing file. Each line is passed to the system at once; with
+    `flush` off, many together, which is faster. A line takes microseconds; put the node into a thread group if the disk
+    is slow.
 
     Attributes:
       text: each line, without its end.
-      path: of the file; relative ones begin in the working directory, and directories that are missing are made.
-      append: whether lines are put behind those that the file has.
-      flush: whether each line is given to the system at once.
-      encoding: how it is written.
+      path: path of the file; relative paths start in the working directory, and missing directories are created.
+      append: add lines to an existing file.
+      flush: pass each line to the system at once.
+      encoding: encoding of the file.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why, and what could be written is in `<name>.part`.
-      ValueError: the encoding has no bytes for a character, or no path is set.
+      OSError: the file cannot be written; the message says why, and the lines written so far are in `<name>.part`.
+      ValueError: the encoding cannot represent a character, or no path is set.
 
     CS::APEX: csapex::ExportFile.
     """
@@ -377,21 +377,21 @@ class WriteLines(_GrowingFile):
 class WriteJsonLines(_GrowingFile):
     """Write values to a file as JSON, a line each.
 
-    Lines go into a file beside it, `<name>.part`, which takes the name when the stream ends or the run is over; so a
-    file of this name is complete. With `append` they go behind those that the file has. The system has each line at
-    once; with `flush` off many together, which is faster. A line takes microseconds; put the node into a thread group
-    where the disk is slow.
+    Lines go into `<name>.part`, which is renamed when the stream ends or the run is over; so a file with the final name
+    is complete. With `append`, lines are added to an existing file. Each line is passed to the system at once; with
+    `flush` off, many together, which is faster. A line takes microseconds; put the node into a thread group if the disk
+    is slow.
 
     Attributes:
-      value: anything that has a form in JSON: dicts, lists, dataclasses, structs, arrays ...
-      path: of the file; relative ones begin in the working directory, and directories that are missing are made.
-      append: whether lines are put behind those that the file has.
-      flush: whether each line is given to the system at once.
+      value: anything that can be represented in JSON: dicts, lists, dataclasses, structs, arrays ...
+      path: path of the file; relative paths start in the working directory, and missing directories are created.
+      append: add lines to an existing file.
+      flush: pass each line to the system at once.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why, and what could be written is in `<name>.part`.
-      TypeError: the value has no form in JSON.
-      ValueError: something in it has none, or no path is set.
+      OSError: the file cannot be written; the message says why, and the lines written so far are in `<name>.part`.
+      TypeError: the value cannot be represented in JSON.
+      ValueError: part of it cannot, or no path is set.
 
     CS::APEX: csapex::ExportFile.
     """
@@ -410,22 +410,22 @@ class WriteJsonLines(_GrowingFile):
 class WriteCsv(_GrowingFile):
     """Write dicts to a file as a table of comma-separated values, a row each.
 
-    The columns are the keys of the first row, unless they are said; a key that a row lacks is empty. Rows go into a
-    file beside it, `<name>.part`, which takes the name when the stream ends or the run is over; so a file of this name
-    is complete. With `append` they go behind those that the file has. The system has each row at once; with `flush` off
-    many together, which is faster. A row takes microseconds; put the node into a thread group where the disk is slow.
+    The columns are the keys of the first row, unless given; missing keys of a row are empty. Rows go into
+    `<name>.part`, which is renamed when the stream ends or the run is over; so a file with the final name is complete.
+    With `append`, rows are added to an existing file. Each row is passed to the system at once; with `flush` off, many
+    together, which is faster. A row takes microseconds; put the node into a thread group if the disk is slow.
 
     Attributes:
       row: values by the names of the columns; None is empty.
-      path: of the file; relative ones begin in the working directory, and directories that are missing are made.
+      path: path of the file; relative paths start in the working directory, and missing directories are created.
       columns: their names in order; none are those of the first row.
-      delimiter: between two values of a row.
-      append: whether rows are put behind those that the file has.
-      flush: whether each row is given to the system at once.
+      delimiter: the character between two values of a row.
+      append: add rows to an existing file.
+      flush: pass each row to the system at once.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why, and what could be written is in `<name>.part`.
-      ValueError: a row has a key that is no column, or no path is set.
+      OSError: the file cannot be written; the message says why, and the lines written so far are in `<name>.part`.
+      ValueError: a row has a key that is not a column, or no path is set.
     """
 
     row = Input(Mapping[str, object])
@@ -465,15 +465,15 @@ class WriteCsv(_GrowingFile):
 class StackArrays(Node):
     """Write all values of a stream to one `.npy` file when it ends: arrays of one shape, or numbers, one row each.
 
-    All of them are kept until then. A run that ends otherwise writes what there is. The file is the old one or the new
-    one, never half of each. `ArrayRows` reads it again row by row.
+    All of them are kept until then. A run that ends otherwise writes what there is. The file is replaced only as a
+    whole. `ArrayRows` reads it again row by row.
 
     Attributes:
       value: an array, of the same shape each, or a number.
-      path: of the file; relative ones begin in the working directory, and directories that are missing are made.
+      path: path of the file; relative paths start in the working directory, and missing directories are created.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
       ValueError: the shapes differ, an array holds Python objects, or no path is set.
     """
 
@@ -496,7 +496,7 @@ class StackArrays(Node):
         self._write(named(self.path))
 
     def teardown(self) -> None:
-        """Write what there is, if nobody has yet."""
+        """Write what there is, unless it was written already."""
         if self.rows and not self.is_written:
             self._write(named(self.path))
 

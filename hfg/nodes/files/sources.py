@@ -1,6 +1,6 @@
 """Files as streams: lines, rows, pictures, and what is written on the keyboard; all end with the file.
 
-Stands on reading, nodetype and ports.
+Depends on reading, nodetype and ports.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ _ENCODINGS: Final = ("utf-8", "utf-8-sig", "latin-1", "ascii", "utf-16", "cp1252
 
 
 class TextLines(Node):
-    """Give a file of text line by line, then end.
+    """Send a file of text line by line, then end.
 
-    It reads ahead by some thousand characters while the loop waits; put it into a thread group where the file is far
-    away. The slot `reset` begins anew.
+    It reads ahead by some thousand characters, which blocks the loop; put the node into a thread group if the file is
+    remote. The slot `reset` starts over.
 
     Attributes:
-      path: of the file; relative ones begin in the working directory.
-      encoding: how it was written.
-      loop: whether it begins again at the end.
+      path: path of the file; relative paths start in the working directory.
+      encoding: encoding of the file.
+      loop: start again at the end.
       line: each line, without its end.
 
     Raises:
-      OSError: the file cannot be read; the sentence says why.
-      ValueError: it is no text of that encoding, or no path is set.
+      OSError: the file cannot be read; the message says why.
+      ValueError: it is not text of that encoding, or no path is set.
 
     CS::APEX: csapex::FileImporter.
     """
@@ -63,21 +63,21 @@ class TextLines(Node):
 
 
 class JsonLines(Node):
-    """Give the values of a file that has JSON on each line, then end.
+    """Send the values of a file that has JSON on each line, then end.
 
-    Empty lines are passed over, and `null` is silence. It reads ahead by some thousand characters while the loop waits;
-    put it into a thread group where the file is far away. The slot `reset` begins anew.
+    Empty lines are passed over, and `null` is silence. It reads ahead by some thousand characters, which blocks the
+    loop; put the node into a thread group if the file is remote. The slot `reset` starts over.
 
     Attributes:
-      path: of the file; relative ones begin in the working directory.
-      loop: whether it begins again at the end.
-      skip_invalid: whether a line that is no JSON is told by `invalid` and passed over, instead of an error.
+      path: path of the file; relative paths start in the working directory.
+      loop: start again at the end.
+      skip_invalid: whether a line that is not JSON is sent by `invalid` and skipped, instead of raising an error.
       value: the value of each line.
-      invalid: a line that is no JSON.
+      invalid: a line that is not JSON.
 
     Raises:
-      OSError: the file cannot be read; the sentence says why.
-      ValueError: a line is no JSON, or no path is set.
+      OSError: the file cannot be read; the message says why.
+      ValueError: a line is not JSON, or no path is set.
 
     CS::APEX: csapex::FileImporter.
     """
@@ -112,25 +112,25 @@ class JsonLines(Node):
 
 
 class CsvRows(Node):
-    """Give the rows of a table of comma-separated values as dicts, then end.
+    """Send the rows of a table of comma-separated values as dicts, then end.
 
-    It reads ahead by some thousand characters while the loop waits; put it into a thread group where the file is far
-    away. The slot `reset` begins anew.
+    It reads ahead by some thousand characters, which blocks the loop; put the node into a thread group if the file is
+    remote. The slot `reset` starts over.
 
     Attributes:
-      path: of the file; relative ones begin in the working directory.
-      delimiter: between two values of a row.
-      header: whether the first row has the names of the columns; else they are called "0", "1" ...
-      guess: whether values that look like numbers become numbers, and empty ones None; else they stay text.
+      path: path of the file; relative paths start in the working directory.
+      delimiter: the character between two values of a row.
+      header: whether the first row has the names of the columns; otherwise they are named "0", "1" ...
+      guess: whether values that look like numbers become numbers, and empty ones None; otherwise they stay text.
       columns: the types of columns that are not guessed: "text", "int", "float" or "bool"; an empty value of a number
         is None.
-      encoding: how it was written.
-      loop: whether it begins again at the end.
+      encoding: encoding of the file.
+      loop: start again at the end.
       row: each row, by the names of the columns.
 
     Raises:
-      OSError: the file cannot be read; the sentence says why.
-      ValueError: a row has more values than there are columns, or one that its column cannot have, it is no text of
+      OSError: the file cannot be read; the message says why.
+      ValueError: a row has more values than there are columns, or one that its column cannot have, it is not text of
         that encoding, or no path is set.
     """
 
@@ -157,19 +157,19 @@ class CsvRows(Node):
 
 
 class ArrayRows(Node):
-    """Give an array of a `.npy` file along its first axis, then end.
+    """Send an array of a `.npy` file along its first axis, then end.
 
-    The file is not read whole: it may be larger than the memory. Put the node into a thread group where the file is far
-    away. The slot `reset` begins anew.
+    The file is not read whole: it may be larger than the memory. Put the node into a thread group if the file is
+    remote. The slot `reset` starts over.
 
     Attributes:
-      path: of the file; relative ones begin in the working directory.
-      loop: whether it begins again at the end.
+      path: path of the file; relative paths start in the working directory.
+      loop: start again at the end.
       row: each part, an array with one axis less.
 
     Raises:
-      OSError: the file cannot be read; the sentence says why.
-      ValueError: it is no such file, holds Python objects or a single number, or no path is set.
+      OSError: the file cannot be read; the message says why.
+      ValueError: it is not such a file, holds Python objects or a single number, or no path is set.
     """
 
     path = Parameter("", Predicate(is_a_path), pattern="*")
@@ -182,7 +182,7 @@ class ArrayRows(Node):
         whole = load_array(place, "r")
         if not isinstance(whole, np.ndarray) or not whole.ndim:
             what = "one value" if isinstance(whole, np.ndarray) else "several arrays"
-            raise ValueError(f'"{place}" has no rows, for it holds {what}')
+            raise ValueError(f'"{place}" has no rows because it holds {what}')
         some = True
         while some:
             some = False
@@ -192,7 +192,7 @@ class ArrayRows(Node):
 
 
 class _Player(Node):
-    """Goes through files in order; can be stopped, played on and begun again."""
+    """Goes through files in order; can be stopped, resumed and restarted."""
 
     order = Parameter("name", choices=("name", "number", "modified"))
     loop = Parameter(False)
@@ -242,23 +242,23 @@ class _Player(Node):
 
 
 class FilePaths(_Player):
-    """Give the paths of the files that a pattern describes, then end: for read_text, read_image and their like.
+    """Send the paths of the files that a pattern describes, then end: for read_text, read_image and their like.
 
     The files are listed when the first path is given, and again for each round of a loop. While it is stopped it gives
     nothing; if then nothing else happens in the run either, the run ends as stalled.
 
     Attributes:
-      pattern: as a shell has it: "images/*.png"; `**` is any number of directories; relative ones begin in the working
+      pattern: as a shell has it: "images/*.png"; `**` is any number of directories; relative paths start in the working
         directory.
       order: by "name", by the "number" in the name, so that 10 follows 9, or by when they were "modified".
-      loop: whether it begins again at the end.
+      loop: start again at the end.
       playing: whether paths are given; the slots change it.
       path: each path.
       began: before the first path of each round.
-      ended: behind the last path of each round.
-      play: goes on.
+      ended: after the last path of each round.
+      play: resumes.
       stop: waits.
-      restart: begins again with the first.
+      restart: starts over with the first.
       abort: ends.
 
     Raises:
@@ -271,38 +271,38 @@ class FilePaths(_Player):
     path = Output(str)
 
     def process(self) -> str:
-        """Give the next one."""
+        """Return the next one."""
         return str(self._next(self.pattern))
 
 
 class ImageFiles(_Player):
-    """Give the pictures that a pattern describes, then end.
+    """Send the pictures that a pattern describes, then end.
 
-    The files are listed when the first one is given, and again for each round of a loop. Each is read while the loop
-    waits, some milliseconds for each million pixels; put the node into a thread group where that is too long. While it
-    is stopped it gives nothing; if then nothing else happens in the run either, the run ends as stalled. Needs OpenCV.
+    The files are listed when the first one is given, and again for each round of a loop. Reading blocks the loop for
+    some milliseconds per million pixels; put the node into a thread group if that is too long. While it is stopped it
+    gives nothing; if then nothing else happens in the run either, the run ends as stalled. Needs OpenCV.
 
     Attributes:
-      pattern: as a shell has it: "images/*.png"; `**` is any number of directories; relative ones begin in the working
+      pattern: as a shell has it: "images/*.png"; `**` is any number of directories; relative paths start in the working
         directory.
       order: by "name", by the "number" in the name, so that 10 follows 9, or by when they were "modified".
       mode: "color" gives blue, green and red, "gray" one channel.
-      loop: whether it begins again at the end.
-      skip_invalid: whether a file that is no picture is told by `invalid` and passed over, instead of an error.
+      loop: start again at the end.
+      skip_invalid: whether a file that is not a picture is sent by `invalid` and skipped, instead of raising an error.
       playing: whether pictures are given; the slots change it.
       image: each picture.
       path: of each picture.
       began: before the first picture of each round.
-      ended: behind the last picture of each round.
-      invalid: the path of a file that is no picture.
-      play: goes on.
+      ended: after the last picture of each round.
+      invalid: the path of a file that is not a picture.
+      play: resumes.
       stop: waits.
-      restart: begins again with the first.
+      restart: starts over with the first.
       abort: ends.
 
     Raises:
-      OSError: there is no such file, or it cannot be read; the sentence says why.
-      ValueError: a file is no picture.
+      OSError: there is no such file, or it cannot be read; the message says why.
+      ValueError: a file is not a picture.
       ModuleNotFoundError: OpenCV is not installed.
 
     CS::APEX: csapex::FileImporter.
@@ -316,7 +316,7 @@ class ImageFiles(_Player):
     invalid = Event(str)
 
     def process(self) -> tuple[Image, str] | None:
-        """Give the next one."""
+        """Return the next one."""
         path = self._next(self.pattern)
         try:
             return load_image(path, "gray" if self.mode == "gray" else "color"), str(path)
@@ -328,11 +328,11 @@ class ImageFiles(_Player):
 
 
 class StandardInput(Node):
-    """Give the lines that the program is sent, by a terminal, a pipe or a file, then end.
+    """Send the lines that the program is sent, by a terminal, a pipe or a file, then end.
 
-    It waits in a thread of its own, so nobody is held up by a keyboard. What was read and not given when a run ends is
-    there for the next run of the process. Under a virtual clock the time of the graph does not wait for it. Bytes that
-    are no UTF-8 become replacement characters.
+    It waits in a thread of its own, so a keyboard blocks nothing. Input that was read but not sent when a run ends is
+    kept for the next run of the process. Under a virtual clock the time of the graph does not wait for it. Bytes that
+    are not UTF-8 become replacement characters.
 
     Attributes:
       line: each line, without its end.

@@ -6,9 +6,9 @@
     keeping     values that are kept and given again: latch, buffer, cache, a cell that nodes share
     collecting  several values as one: counters, the last ones, windows
     timing      values that come later or less often: delay, debounce, throttle
-    background  work beside the stream
+    background  work concurrent with the stream
 
-All of them pass on values, never token objects (rule A4), so activity goes through them by active edges alone, as it
+All of them pass on values, never token objects (rule A4), so activity passes through them only over active edges, as it
 does through any node. `docs/howto/library.md` shows how to choose.
 """
 

@@ -1,4 +1,4 @@
-"""Work beside the stream that asks for it. Stands on nodetype and ports."""
+"""Work concurrent with the stream that requests it. Depends on nodetype and ports."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ __all__ = ["Background"]
 
 
 class Background(Node):
-    """Work on every value in a task of its own, beside the stream: derive from it and override `work`.
+    """Work on every value in a task of its own, concurrently with the stream: derive from it and override `work`.
 
-    Whoever sends goes on at once, until `at_most` values are under way; then it waits for a place, and slot calls of
+    The sender continues at once, until `at_most` values are in progress; then it waits for a place, and slot calls of
     this node, such as `reset`, wait with it (rule F9). What is done is signalled as it is done, in any order, with the
     stamp of the value. The run knows the tasks (rules X1, R5): it does not end before them, what one raises is an error
     of the node by its `on_error`, and they are cancelled when the node is torn down, reset or disabled. The end of the
@@ -26,8 +26,8 @@ class Background(Node):
 
     Attributes:
       value: what is worked on.
-      at_most: how many values are under way at once.
-      done: what `work` gave back for a value.
+      at_most: maximum number of values in progress at once.
+      done: the result of `work` for a value.
 
     Examples:
       >>> class Upload(Background):

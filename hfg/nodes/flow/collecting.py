@@ -1,4 +1,4 @@
-"""Several values as one: counters, the last ones, windows. Stands on nodetype and ports."""
+"""Several values as one: counters, the last ones, windows. Depends on nodetype and ports."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class CountItems(Node):
 
 
 class Accumulate(Node):
-    """Give the last values as a list, with each value.
+    """Send the last values as a list, with each value.
 
     The list grows until it holds `size` values and slides then; it is a new one each time. Silence is not counted. For
     lists that are given only when they are full use `Window`.
@@ -88,7 +88,7 @@ class Accumulate(Node):
 
 
 class Recent(Node):
-    """Give the values of the last seconds as a list, with each value.
+    """Send the values of the last seconds as a list, with each value.
 
     Seconds by the stamps of the values: what is older than this one by `seconds` or more is left out, and so it may be
     late. How many are kept depends on their rate, but not on how stamps are rounded: at 10 Hz, 0.3 s are always three
@@ -113,15 +113,15 @@ class Recent(Node):
 
 
 class Window(Node):
-    """Give each window of a number of values as a list.
+    """Send each window of a number of values as a list.
 
     Windows begin every `step` values: side by side if that is `size`, over one another if it is less; if it is more,
-    what lies between them is left out. While a window fills there is silence, so that a join behind it stays in step.
+    what lies between them is left out. While a window fills there is silence, so that a join after it stays in step.
 
     Attributes:
       value: anything.
       size: how many values a window holds.
-      step: by how many values a window begins behind the one before; 0 is `size`.
+      step: number of values from the start of a window to the start of the next; 0 is `size`.
       partial: whether a window that the end cuts off is given, if it has a value that no other had.
       values: the window, the oldest first.
     """
@@ -152,24 +152,24 @@ class Window(Node):
         return window
 
     def end(self) -> None:
-        """Give what is left."""
+        """Send what is left."""
         if self.partial and self.fresh:
             self.values.send(self.kept)
 
 
 class TimeWindow(Node):
-    """Tell each window of time as a list, as soon as it is over.
+    """Send each window of time as a list, as soon as it is over.
 
     Time is that of the stamps, so the same values make the same windows, however late or fast they come. The windows
     begin at the first stamp and then every `step_s`; one holds the stamps from its begin to before its end. It is over
-    when a stamp at or behind its end comes, or the stream has ended. Windows without a value are not told. A value that
-    comes when its windows are over is left out. A stamp that misses a begin or an end by rounding only is at it: at
-    10 Hz, a window of 0.3 s always holds three values.
+    when a stamp at or after its end arrives, or the stream has ended. Windows without a value are not sent. A value
+    that arrives when its windows are over is ignored. A stamp that misses a begin or an end by rounding only is at it:
+    at 10 Hz, a window of 0.3 s always holds three values.
 
     Attributes:
       value: anything.
       seconds: how long a window is.
-      step_s: by how much a window begins behind the one before, in seconds; 0 is `seconds`.
+      step_s: seconds from the start of a window to the start of the next; 0 is `seconds`.
       window: the values of one, in the order in which they came; its stamp is that of the last one.
     """
 

@@ -1,4 +1,4 @@
-"""What belongs together: by step, by stamp, or the newest of each. Stands on nodetype and ports."""
+"""What belongs together: by step, by stamp, or the newest of each. Depends on nodetype and ports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["CombineLatest", "Join", "JoinByStamp", "SampleAndHold", "Synchronize
 
 
 class Join(Node):
-    """Let several streams go on together: a barrier.
+    """Let several streams continue together: a barrier.
 
     Fires when each input holds a token, and passes each value on by the output of the same number. Where one is silent
     all are, and all end with the first that does.
@@ -55,12 +55,12 @@ class Synchronizer(Node):
 
 
 class SampleAndHold(Node):
-    """Keep the newest value of one stream and give it in step with another: so streams of different rates meet.
+    """Keep the newest value of one stream and repeat it in step with another, to combine streams of different rates.
 
-    `value` is a slot, so whoever sends there waits for nobody and nobody waits for it; `tick` says when. Connect
-    `fast.out.sent` with overflow="latest" where the fast stream must not wait even for its turn on the loop. Before the
-    first value, and with `fresh` for each tick behind which nothing new has come, there is silence. The node ends with
-    `tick`; when the stream of `value` has ended, its last value stays.
+    `value` is a slot, so neither stream waits for the other; `tick` decides when the value is sent. Connect
+    `fast.out.sent` with overflow="latest" where the fast stream must not wait even for its turn on the loop. There is
+    silence before the first value and, with `fresh`, at each tick without a new value. The node ends with `tick`; when
+    the stream of `value` has ended, its last value stays.
 
     Attributes:
       tick: each value here asks for one; the value itself is not looked at.
@@ -78,7 +78,7 @@ class SampleAndHold(Node):
     kept = State(factory=list[Token[Any]])
 
     def process(self, tick: Token[Any]) -> None:
-        """Give what is kept."""
+        """Send what is kept."""
         if self.kept:
             newest = self.kept[0]
             self.held.send(newest.value)
@@ -98,11 +98,10 @@ class SampleAndHold(Node):
 
 
 class CombineLatest(Node):
-    """Tell the newest value of several streams whenever one of them has a new one.
+    """Send the newest value of several streams whenever one of them has a new one.
 
-    The streams need not be in step nor of one rate. Nothing is told before each has had a value. Silence and ends are
-    not
-    seen: of a stream that has ended the last value stays.
+    The streams need not be in step nor of one rate. Nothing is sent before each has had a value. Silence and ends are
+    ignored: the last value of an ended stream stays.
 
     Attributes:
       values: one slot for each stream.
@@ -123,15 +122,15 @@ class CombineLatest(Node):
 class JoinByStamp(Node):
     """Join what was measured at about the same moment, whatever its rate and however late it comes.
 
-    Each stream waits in order of its stamps. As soon as every stream has one, those are dropped that are older than the
-    newest of the first ones by more than the tolerance, for the stream of that one has no partner for them; what is
-    then first everywhere lies within the tolerance and is joined. Which of several partners within the tolerance is
-    taken: the oldest. The result depends on values and stamps alone, not on the order in which the streams arrive, as
+    Each stream waits in order of its stamps. As soon as every stream has one, values that are older than the newest of
+    the first ones by more than the tolerance are dropped, because that one's stream has no partner for them. The values
+    that are then first lie within the tolerance and are joined. Which of several partners within the tolerance is
+    taken: the oldest. The result depends only on values and stamps, not on the order in which the streams arrive, as
     long as each by itself is in order and none is longer than `size`.
 
     Attributes:
       values: one slot for each stream.
-      tolerance_s: the stamps of what is joined differ by so much at most, in seconds.
+      tolerance_s: maximum difference between the stamps of joined values, in seconds.
       size: how many values of a stream wait at most; then the oldest is dropped.
       joined: a list with one value of each stream, in order; its stamp is the newest of theirs.
       unmatched: each value that was dropped without a partner, with its own stamp.

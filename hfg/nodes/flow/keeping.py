@@ -1,4 +1,4 @@
-"""Values that are kept and given again. Stands on nodetype and ports."""
+"""Values that are kept and given again. Depends on nodetype and ports."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["Cache", "HoldableBuffer", "Latch", "MemoryCell", "TriggeredLatch"]
 
 
 class Latch(Node):
-    """Keep the newest value and give it again and again: a source of what came last.
+    """Keep the newest value and send it again and again: a source.
 
     From the first value on it fires as fast as its consumers allow, or at the rate of its `max_rate_hz`, which the
     check asks for; the stamp is that of the firing. It never ends by itself: send to `close` when the values do, or
@@ -47,7 +47,7 @@ class Latch(Node):
         return bool(self.kept)
 
     def process(self) -> Any:
-        """Give it."""
+        """Return it."""
         return self.kept[0]
 
     @slot
@@ -67,12 +67,12 @@ class Latch(Node):
 
 
 class TriggeredLatch(Node):
-    """Keep the newest value and tell it when asked to.
+    """Keep the newest value and send it on request.
 
-    Asked before the first value, it tells nothing. The signal has the stamp of the one that asked.
+    Before the first value, it sends nothing. The signal has the stamp of the one that asked.
 
     Attributes:
-      value: what is told from now on.
+      value: the value to send from now on.
       publish: asks for it.
       published: the newest value.
       forget: nothing is told until the next value.
@@ -135,23 +135,23 @@ class HoldableBuffer(Node):
 class Cache(Node):
     """Record values, and play them back at a rate.
 
-    What comes is kept, the last `size` values. `play` tells those from `first` to `last`, each in its turn and not
-    before there is room for it behind an edge that waits; with `loop` again and again, until `pause`. What comes
-    meanwhile is kept for the next time. `play` while it plays begins anew.
+    The last `size` values are kept. `play` sends those from `first` to `last`, each in its turn and not before a
+    waiting edge has room for it; with `loop` again and again, until `pause`. Values that arrive meanwhile are kept for
+    the next time. `play` while it plays starts over.
 
     Attributes:
       value: is kept.
       size: how many values are kept; the oldest are forgotten.
       buffered: how many there are.
-      rate_hz: how many values a second are told.
-      first: the number of the first value to be told, from 0, which is the oldest.
+      rate_hz: how many values per second are sent.
+      first: number of the first value to send, from 0, which is the oldest.
       last: the number of the last one; negative numbers count from the newest, which is -1.
       loop: whether the first follows the last.
       play: begins to tell them.
       pause: tells no more.
       forget: keeps nothing.
       played: a value that was kept.
-      finished: all were told; does not come with `loop`, nor behind `pause`.
+      finished: all were sent; not signalled with `loop`, nor after `pause`.
 
     CS::APEX: csapex::Cache.
     """
@@ -218,10 +218,10 @@ class Cache(Node):
 class MemoryCell(Node):
     """Keep a value under a name for all cells of that name in the graph, inside of subgraphs too.
 
-    Each run begins without values; what a cell of another run keeps is its own. Who sets a value tells all cells of the
-    name, each by its own event, and so it is with clearing. Of what is set at the same moment by several nodes the
-    order is that of the run. Edges show in a drawing who tells whom, and cells do not: use them for what would else
-    cross everything. A cell belongs on the loop, not into a thread.
+    Each run begins without values; what a cell of another run keeps is its own. Setting or clearing a value triggers
+    the events of all cells of the name. If several nodes set a value at the same moment, the order is that of the run.
+    A drawing shows edges, but not the connections between cells: use cells for values whose edges would cross
+    everything else. A cell belongs on the loop, not into a thread.
 
     Attributes:
       name: the name.
@@ -284,7 +284,7 @@ class MemoryCell(Node):
 
 
 class _Shared:
-    """What the cells of one run share."""
+    """Shared state of the cells of one run."""
 
     def __init__(self) -> None:
         self.values: dict[str, Any] = {}
@@ -294,7 +294,7 @@ class _Shared:
         self._cells[id(cell)] = weakref.ref(cell)
 
     def leave(self, cell: MemoryCell) -> None:
-        """Forget everything with the last one, for then the run is over."""
+        """Forget everything with the last cell, because the run is over then."""
         self._cells.pop(id(cell), None)
         if not self._cells:
             self.values.clear()

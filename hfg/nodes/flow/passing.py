@@ -1,4 +1,4 @@
-"""One stream in, one out: all of it, a part of it, or as events. Stands on nodetype, functions and ports."""
+"""One stream in, one out: all of it, a part of it, or as events. Depends on nodetype, functions and ports."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ T = TypeVar("T")
 def relay(value: T) -> T:
     """Pass every value on as it is.
 
-    Silence stays silence, and the end of the input is the end. The value goes on, not its token: activity that arrives
-    makes the relay active, and leaves it with this value if an active edge leads on.
+    Silence stays silence, and the end of the input is the end. The value is passed on, not its token: activity that
+    arrives makes the relay active, and leaves it with this value if an active edge leads on.
 
     Args:
       value: anything.
@@ -47,10 +47,10 @@ def relay(value: T) -> T:
 
 
 class Take(Node):
-    """Pass the first values on, then end, although the input goes on.
+    """Pass the first values on, then end, although the input continues.
 
-    Silence is not counted. With the last value the node ends as if its input had ended, and a source that works for it
-    alone is given up.
+    Silence is not counted. With the last value the node ends as if its input had ended, and a source that works only
+    for it is stopped.
 
     Attributes:
       value: anything.
@@ -75,7 +75,7 @@ class Take(Node):
 class Skip(Node):
     """Leave the first values out, then pass all others on.
 
-    For each value that is left out there is silence, so that a join behind it stays in step. Silence is not counted.
+    Each value that is left out is replaced by silence, so that a join after it stays in step. Silence is not counted.
 
     Attributes:
       value: anything.
@@ -122,11 +122,11 @@ class TakeWhile(Node):
 class EveryNth(Node):
     """Pass every nth value on.
 
-    For the others there is silence, so that a join behind it stays in step. Silence is not counted.
+    The others are replaced by silence, so that a join after it stays in step. Silence is not counted.
 
     Attributes:
       value: anything.
-      n: one value of so many is passed on.
+      n: one of n values is passed on.
       offset: how many values are left out before the first one that is passed on.
       out: one value of n.
     """
@@ -147,9 +147,9 @@ class EveryNth(Node):
 class Different(Node):
     """Pass a value on if it differs from the one before.
 
-    The first value is passed on. For one that is the same there is silence, so that a join behind it stays in step.
-    Arrays are the same if their shapes and all elements are; what cannot be compared is different. `logic.Changed`
-    tells of changes by an event.
+    The first value is passed on. Values that are the same are replaced by silence, so that a join after it stays in
+    step. Arrays are the same if their shapes and all elements are; what cannot be compared is different.
+    `logic.Changed` tells of changes by an event.
 
     Attributes:
       value: anything.
@@ -171,8 +171,8 @@ class Different(Node):
 class Distinct(Node):
     """Pass a value on if it was not seen before.
 
-    For one that was there is silence, so that a join behind it stays in step. What was seen is kept up to a number of
-    values, then the ones longest unseen are forgotten.
+    Values that were seen are replaced by silence, so that a join after it stays in step. Up to a number of values are
+    remembered; then those seen longest ago are forgotten.
 
     Attributes:
       value: anything that can be a key of a dictionary.
@@ -207,9 +207,9 @@ class Distinct(Node):
 class MessageEvent(Node):
     """Signal each value that arrives: data becomes an event.
 
-    An edge from an output to a slot, or from the event `sent` that stands beside each output, does the same without a
-    node. It is the buffer v_b of the paper's figure 13: while it is active its next signal takes the activity along;
-    `activity.WaitForMessage` is that with a slot for the activity to arrive at. Silence and the end signal nothing.
+    An edge from an output to a slot, or from an output's event `sent`, does the same without a node. It is the buffer
+    v_b of the paper's figure 13: while it is active its next signal takes the activity along; `activity.WaitForMessage`
+    is that with a slot for the activity to arrive at. Silence and the end signal nothing.
 
     Attributes:
       value: anything.
@@ -229,7 +229,7 @@ class MessageEvent(Node):
 class AtEnd(Node):
     """Signal that a stream has ended.
 
-    Connected to `graph.stop` it ends the run with the stream, whatever else still goes on. Values are passed on, so
+    Connected to `graph.stop` it ends the run with the stream, whatever else is still running. Values are passed on, so
     that it can stand in a chain; an end that never comes, of a source without one, signals nothing.
 
     Attributes:
@@ -256,16 +256,16 @@ class AtEnd(Node):
 
 
 class MarkerDetector(Node):
-    """Signal the silence of one stream beside another, and its end.
+    """Signal the silence of one stream relative to another, and its end.
 
     Silence reaches no code by itself (rule F4): `reference` is what shows it, a stream in step with the other one, such
-    as the values before a filter whose result is looked at. Each of its values beside which the other stream is silent,
-    or has ended, is signalled. Where `reference` is silent nothing is decided.
+    as the values before a filter whose result is looked at. Each of its values for which the other stream is silent, or
+    has ended, is signalled. Where `reference` is silent nothing is decided.
 
     Attributes:
       reference: a stream in step with `value`, from which the fork began.
       value: what is looked at.
-      silent: the value of `reference` beside which there was none.
+      silent: the value of `reference` for which there was none.
       ended: both streams have ended, or `reference` has.
 
     CS::APEX: csapex::MarkerMessageDetector.

@@ -1,4 +1,4 @@
-"""Several ways: many streams into one, one into many, and doors. Stands on nodetype, functions and ports."""
+"""Several ways: many streams into one, one into many, and doors. Depends on nodetype, functions and ports."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ T = TypeVar("T")
 class Merge(Node):
     """Bring several streams into one, each value as it comes.
 
-    The streams need not be in step nor of one rate: nobody waits for anybody, and nothing is lost. Of what arrives at
-    one moment the order is that of the run, none to lean on. Silence and ends are not seen; a consumer that is fed by
+    The streams need not be in step nor of one rate: no stream waits for another, and nothing is lost. The order of
+    values that arrive at the same moment depends on the run. Silence and ends are ignored; a consumer that is fed by
     the event ends when the whole graph has nothing left to do (rule F13). For branches that are in step, such as those
     of `switch`, use `Rejoin`.
 
@@ -97,7 +97,7 @@ class Rejoin(Node):
 class Demux(Node):
     """Pass a value on by one of several outputs.
 
-    At the other outputs there is silence, so that what is behind them stays in step.
+    At the other outputs there is silence, so that what is after them stays in step.
 
     Attributes:
       value: anything.
@@ -152,8 +152,8 @@ def switch(value: T, *, predicate: bool = True) -> tuple[T | None, T | None]:
 class Gate(Node):
     """Pass values on while the gate is open.
 
-    While it is closed there is silence, so that a join behind it stays in step. What arrives while it is closed is
-    dropped. `activity.ActivityGate` is open while it is active.
+    While it is closed there is silence, so that a join after it stays in step. Values that arrive while it is closed
+    are dropped. `activity.ActivityGate` is open while it is active.
 
     Attributes:
       value: anything.

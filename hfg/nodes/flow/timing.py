@@ -1,4 +1,4 @@
-"""Values that come later, or less often. Stands on nodetype and ports."""
+"""Values that come later, or less often. Depends on nodetype and ports."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _ROUNDING: Final = 1e-6
 class Delay(Node):
     """Let values come later.
 
-    By the input one value is under way at a time, and whoever sends waits; made with `concurrency=`, so many are
-    (rule F14). By the slot nobody waits, every value comes later by the same time, and the order is kept; there is no
-    limit to how many are under way. Stamps stay those of the values. The end waits for what is under way by the input.
-    A value that has come by the slot before the node became active carries no activity.
+    At the input, one value is in progress at a time and the sender waits, unless the node is made with `concurrency=`
+    (rule F14). At the slot, the sender does not wait, every value is delayed by the same time, and the order is kept;
+    the number of values in progress is unlimited. Stamps stay those of the values. The end waits for values in progress
+    at the input. A value that has come by the slot before the node became active carries no activity.
 
     Attributes:
       value: anything.
@@ -72,15 +72,15 @@ class Delay(Node):
 
 
 class Debounce(Node):
-    """Tell the newest value once no other has come for some time.
+    """Send the newest value once no other has arrived for some time.
 
-    What comes sooner behind one another is dropped but for the last. A stream that never rests is never told of, but
-    when it ends. The stamp is that of the value.
+    Of values that arrive in quicker succession, only the last is kept. A stream that never pauses is sent only when it
+    ends. The stamp is that of the value.
 
     Attributes:
       value: anything.
       seconds: how long it must be quiet; looked at with each value.
-      settled: the last value before that.
+      settled: the last value before the pause.
     """
 
     settled = Event(Any)
@@ -93,7 +93,7 @@ class Debounce(Node):
 
     @slot
     def value(self, value: Token[Any]) -> None:
-        """Keep it, and wait anew."""
+        """Keep it, and restart the wait."""
         self.newest = [value]
         self.alarm.set(self.seconds)
 
@@ -103,15 +103,15 @@ class Debounce(Node):
 
 
 class Throttle(Node):
-    """Tell the newest value, not more often than at a rate.
+    """Send the newest value, but not more often than at a given rate.
 
-    The first value is told at once and begins a grid of that rate; in each period of it the newest value is told once,
-    as soon as it can be, and what comes between is dropped but for the last (rule F11). Nothing is told twice. Nobody
-    waits for anybody, so a fast stream meets a slow one here; the stamp is that of the value.
+    The first value is sent at once and starts a grid of that rate; in each period the newest value is sent once, as
+    soon as possible, and all but the last of the others are dropped (rule F11). Nothing is sent twice. The sender does
+    not wait, so a fast stream can feed a slow one; the stamp is that of the value.
 
     Attributes:
       value: anything.
-      rate_hz: how many values a second are told at most.
+      rate_hz: maximum number of values sent per second.
       throttled: the newest value.
 
     CS::APEX: csapex::Throttle.

@@ -22,8 +22,8 @@ __all__ = ["Classifier"]
 class Classifier(Node):
     """Say which class samples belong to, by a model that a trainer has written.
 
-    Fires once for each list of samples. The file is read with the first of them, and again after `reload`; while there
-    is none yet there is silence, so that a graph may train and ask at once.
+    Fires once per list of samples. The file is read with the first of them, and again after `reload`; while there is
+    none yet there is silence, so that a graph may train and ask at once.
 
     Attributes:
       path: of the file: random trees, nearest neighbors or support vectors, as OpenCV writes them.
@@ -37,7 +37,7 @@ class Classifier(Node):
     Raises:
       ValueError: the file holds no such model, or a sample has more or fewer numbers than it has learned from, or one
         that is not finite.
-      OSError: the file cannot be read; the sentence says why.
+      OSError: the file cannot be read; the message says why.
 
     CS::APEX: csapex::RandomTrees, csapex::SVM.
     """

@@ -37,7 +37,7 @@ def model_of(data: bytes, name: str) -> Any:
       name: of the file, for messages.
 
     Raises:
-      ValueError: it is none.
+      ValueError: it is not one.
     """
     try:
         need_harmless("model", data)
@@ -57,7 +57,7 @@ def table_of(samples: Sequence[Sample], width: int | None = None) -> Any:
       width: how many numbers each has; None for as many as the first one.
 
     Raises:
-      ValueError: one has more or fewer numbers than the others, none at all, or one that is no finite number.
+      ValueError: one has more or fewer numbers than the others, none at all, or one that is not finite.
     """
     width = len(samples[0].values) if width is None else width
     for sample in samples:

@@ -38,12 +38,12 @@ class FunctionSamples(Node):
 
     A source. A sample is a place x, y with x from 0 to one turn. Its y is the cosine of x, give or take 0.05; that of
     an outlier lies 0.1 to 2.1 further up or down. The label is 1 within 0.1 of the cosine, else 0. The slot `reset`
-    begins anew, with the same samples.
+    starts over, with the same samples.
 
     Attributes:
       outliers: how likely an outlier is.
       seed: another one makes other samples.
-      count: after how many it ends; 0 goes on without end.
+      count: number of samples before it ends; 0 means without end.
       sample: the samples.
 
     CS::APEX: csapex::FunctionSampleGenerator.
@@ -96,7 +96,7 @@ def label_samples(
     *,
     label: Annotated[int, Interval(ge=0, le=255)] = 0,
 ) -> list[Sample]:
-    """Give samples other labels.
+    """Return samples other labels.
 
     Args:
       samples: any number of them.
@@ -138,7 +138,7 @@ def filter_samples(samples: T, *, label: int = 1) -> T | None:
 
 
 class SampleSplitter(Node):
-    """Give the numbers of a sample and its label at an output each.
+    """Send the numbers of a sample and its label at an output each.
 
     Attributes:
       sample: with as many numbers as there are outputs.

@@ -49,7 +49,7 @@ class _Trainer(Node):
 
     def _learn(self) -> None:
         if not self.kept:
-            raise ValueError("there are no samples to learn from yet: connect some, or train later")
+            raise ValueError("no samples to train on; connect a source of samples, or train later")
         table = table_of(self.kept)
         labels = np.array([sample.label for sample in self.kept], np.int64)
         if np.abs(labels).max() > 2**24:  # OpenCV keeps them as floats
@@ -71,15 +71,14 @@ class _Trainer(Node):
 class RandomTreesTrainer(_Trainer):
     """Learn a forest of random trees, of which each has a vote.
 
-    Fires once for each sample or list of samples and keeps them; `train` learns from all of them and writes the file,
-    which is the old one or the new one, never half of each. Learning takes milliseconds to seconds: put the node into a
-    thread group.
+    Fires once per sample or list of samples, and keeps them; `train` learns from all of them and writes the file, which
+    is replaced only as a whole. Learning takes milliseconds to seconds: put the node into a thread group.
 
     Attributes:
       sample: a sample with its label.
       samples: several of them.
-      path: of the file.
-      every: learns by itself after so many further samples; 0 only when asked to.
+      path: path of the file.
+      every: number of further samples after which it learns by itself; 0: only when asked to.
       depth: of a tree, at most.
       least: how many samples a branch needs to be parted further.
       variables: among how many of the numbers, chosen at random, each branch takes the best; 0 for their square root.
@@ -90,12 +89,12 @@ class RandomTreesTrainer(_Trainer):
         there each time.
       train: learn now.
       clear: forget the samples.
-      trained: the path, when the file is there.
+      trained: the path, after the file was written.
 
     Raises:
       ValueError: there are no samples, they have different numbers of numbers, one is not finite, or OpenCV refuses
         them; the message says why.
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
 
     CS::APEX: csapex::RandomTreesTrainer.
     """
@@ -125,23 +124,23 @@ class RandomTreesTrainer(_Trainer):
 class NearestTrainer(_Trainer):
     """Learn by heart: what is asked later belongs to the class of most of its nearest neighbors.
 
-    Fires once for each sample or list of samples and keeps them; `train` writes all of them to the file, which is the
-    old one or the new one, never half of each.
+    Fires once per sample or list of samples, and keeps them; `train` writes all of them to the file, which is replaced
+    only as a whole.
 
     Attributes:
       sample: a sample with its label.
       samples: several of them.
-      path: of the file.
-      every: writes by itself after so many further samples; 0 only when asked to.
+      path: path of the file.
+      every: number of further samples after which it writes by itself; 0: only when asked to.
       neighbors: how many of them vote.
       train: write now.
       clear: forget the samples.
-      trained: the path, when the file is there.
+      trained: the path, after the file was written.
 
     Raises:
       ValueError: there are no samples, they have different numbers of numbers, one is not finite, or OpenCV refuses
         them; the message says why.
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
     """
 
     neighbors = Parameter(5, Interval(ge=1, le=1000))
@@ -155,26 +154,26 @@ class NearestTrainer(_Trainer):
 class SvmTrainer(_Trainer):
     """Learn a support vector machine: the border between classes that is farthest from all samples.
 
-    Fires once for each sample or list of samples and keeps them; `train` learns from all of them and writes the file,
-    which is the old one or the new one, never half of each. Numbers of about the same size do best. Learning takes
-    milliseconds to seconds: put the node into a thread group.
+    Fires once per sample or list of samples, and keeps them; `train` learns from all of them and writes the file, which
+    is replaced only as a whole. Numbers of about the same size do best. Learning takes milliseconds to seconds: put the
+    node into a thread group.
 
     Attributes:
       sample: a sample with its label.
       samples: several of them.
-      path: of the file.
-      every: learns by itself after so many further samples; 0 only when asked to.
+      path: path of the file.
+      every: number of further samples after which it learns by itself; 0: only when asked to.
       kernel: the shape of the border: "linear" is straight, "rbf" goes round samples.
       c: how much a sample on the wrong side costs.
       gamma: how near the samples are that an "rbf" border goes round; larger is nearer.
       train: learn now.
       clear: forget the samples.
-      trained: the path, when the file is there.
+      trained: the path, after the file was written.
 
     Raises:
       ValueError: there are no samples, all of one class, they have different numbers of numbers, one is not finite, or
         OpenCV refuses them; the message says why.
-      OSError: the file cannot be written; the sentence says why, and the old one is whole.
+      OSError: the file cannot be written; the message says why, and the old file is unchanged.
 
     CS::APEX: csapex::SVMTrainer.
     """

@@ -1,8 +1,8 @@
 """Where labelled things are: a mixture of Gaussians for each label, learned sighting by sighting.
 
 Some sightings are of something else, or were made where the robot believed to be somewhere else. So each label has
-several places where it may be, and a share of sightings that belong to none; a place counts by how many sightings
-stand behind it, and old ones fade.
+several places where it may be, and a share of sightings that belong to none; the weight of a place is the number of its
+sightings, and old ones fade.
 """
 
 from __future__ import annotations
@@ -107,10 +107,10 @@ class LandmarkMixture:
                 one.fade(self.fading)
 
     def known(self, least: float = 2.0, ahead: float = 0.6) -> dict[str, Landmark]:
-        """Give the place of each label that is known.
+        """Return the place of each label that is known.
 
         Args:
-          least: so many sightings it takes.
+          least: number of sightings needed.
           ahead: which share of all sightings of its label the place must have.
         """
         found = {}
@@ -138,14 +138,14 @@ def _density(off: Any, variance: float) -> float:
 class LandmarkMap(Node):
     """Learn where labelled things are, from sightings of which some are wrong.
 
-    Fires once for each list of sightings. For each label there is a mixture of Gaussians, learned step by step, and a
-    share of sightings that belong to none; a label is known when one place has enough sightings, and most of them.
+    Fires once per list of sightings. For each label there is a mixture of Gaussians, learned step by step, and a share
+    of sightings that belong to none; a label is known when one place has enough sightings, and most of them.
 
     Attributes:
-      least: so many sightings it takes.
+      least: number of sightings needed.
       ahead: which share of the sightings of its label a place must have.
       spread: how far sightings of one thing lie apart although they were thought exact, in metres.
-      seen: things in the map frame, each with a sigma; one whose place is no number is left out.
+      seen: things in the map frame, each with a sigma; one whose place is not a number is left out.
       known: the place of each label that is known.
       forget: the label of what is to be forgotten; "" forgets all.
     """

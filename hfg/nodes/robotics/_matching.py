@@ -48,9 +48,9 @@ def match_scan(
 ) -> ScanMatch:
     """Lay a scan onto the walls of a map, starting from a guess.
 
-    Fires once for each scan. Each point pulls its nearest wall (point to line, by Gauss and Newton); what lies far off
-    every wall, such as other robots, counts less and less and then nothing. The guess pulls too, as hard as it is sure:
-    where the walls do not say where along them the robot is, the guess does, and the covariance tells so.
+    Fires once per scan. Each point pulls its nearest wall (point to line, by Gauss and Newton); what lies far off every
+    wall, such as other robots, counts less and less and then nothing. The guess pulls too, as hard as it is sure: where
+    the walls do not say where along them the robot is, the guess does, and the covariance tells so.
 
     Args:
       points: in the robot's frame, in metres.
@@ -66,7 +66,7 @@ def match_scan(
       out: the match; with fewer than three points or no wall it is the guess, with a share of 0.
 
     Raises:
-      ValueError: the guess or its covariance has what is no number, or the covariance is none.
+      ValueError: the guess or its covariance contains NaN, or the covariance is not valid.
     """
     before = np.diag([0.09, 0.09, 0.0225]) if covariance is None else covariance
     if not (np.isfinite(guess).all() and np.isfinite(before).all()):
@@ -125,7 +125,7 @@ class _Pull:
         self.wall: Any = None
 
     def at(self, pose: Any, tolerance: float) -> tuple[Any, Any, Any]:
-        """Give for each point how far its line is, how that changes with the pose, and how far its wall is."""
+        """Return for each point how far its line is, how that changes with the pose, and how far its wall is."""
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
         arms = self.points @ np.array([[cos, sin], [-sin, cos]])
         places = arms + pose[:2]
@@ -140,7 +140,7 @@ class _Pull:
         return off, np.concatenate([normals, turn[:, None]], 1), np.hypot(off, beyond)
 
     def _went(self, pose: Any) -> float:
-        """Give how far the farthest point has moved at most since the walls were sought."""
+        """Return how far the farthest point has moved at most since the walls were sought."""
         step = _difference(pose, self.sought_at)
         return float(np.hypot(step[0], step[1]) + abs(step[2]) * self.farthest)
 
@@ -158,7 +158,7 @@ def _difference(pose: Any, guess: Any) -> Any:
 
 
 def moved(pose: Any, step: Any) -> Any:
-    """Give a pose after a step in the frame of the map; its heading lies between -pi and pi."""
+    """Return a pose after a step in the frame of the map; its heading lies between -pi and pi."""
     after = pose + step
     after[2] = np.remainder(after[2] + np.pi, 2 * np.pi) - np.pi
     return after

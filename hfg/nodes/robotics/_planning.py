@@ -35,9 +35,9 @@ def plan_path(
 ) -> Positions | None:
     """Find the cheapest path over a grid.
 
-    Fires once for each set of costs. It is silent if there is no path, or if the start or the goal does not lie on the
-    grid. The start may lie in a blocked cell, such as that of the robot itself; then the path begins at the nearest one
-    that is free.
+    Fires once per set of costs. It is silent if there is no path, or if the start or the goal does not lie on the grid.
+    The start may lie in a blocked cell, such as that of the robot itself; then the path begins at the nearest one that
+    is free.
 
     Args:
       costs: of each cell; 0 or less, infinite or not a number is blocked.

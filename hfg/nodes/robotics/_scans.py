@@ -46,7 +46,7 @@ class Disk(NamedTuple):
       x: of its middle, in metres.
       y: of its middle.
       points: on how many points that stands.
-      vx: how fast it moves along x, in m/s; 0 as long as nobody has followed it.
+      vx: how fast it moves along x, in m/s; 0 until it has been tracked.
       vy: how fast along y.
     """
 
@@ -61,14 +61,14 @@ class Disk(NamedTuple):
 def scan_points(
     ranges: Ranges, angles: Ranges, *, max_range: Annotated[float, Interval(gt=0), Unit("m")] = 30.0
 ) -> Positions:
-    """Give the points that a laser has hit, in the frame of the laser: x ahead, y to the left.
+    """Return the points that a laser has hit, in the frame of the laser: x ahead, y to the left.
 
-    Fires once for each scan. A beam that has hit nothing has no point: its range is `max_range` or more, not a number,
-    or not above 0.
+    Fires once per scan. A beam that has hit nothing has no point: its range is `max_range` or more, not a number, or
+    not above 0.
 
     Args:
       ranges: how far each beam went, in metres.
-      angles: of the beams, in radians, counter-clockwise from straight ahead.
+      angles: angles of the beams, in radians, counter-clockwise from straight ahead.
       max_range: how far the laser sees.
 
     Returns:
@@ -91,13 +91,13 @@ def nearest_obstacle(
     width: Annotated[float, Interval(gt=0, le=2 * math.pi), Unit("rad")] = 0.7,
     max_range: Annotated[float, Interval(gt=0), Unit("m")] = 30.0,
 ) -> float:
-    """Give how far it is to what is nearest in a sector.
+    """Return how far it is to what is nearest in a sector.
 
-    Fires once for each scan.
+    Fires once per scan.
 
     Args:
       ranges: how far each beam went, in metres.
-      angles: of the beams, in radians, counter-clockwise from straight ahead.
+      angles: angles of the beams, in radians, counter-clockwise from straight ahead.
       direction: where the middle of the sector points.
       width: of the whole sector, in radians.
       max_range: how far the laser sees.
@@ -127,7 +127,7 @@ def _hits(ranges: Any, angles: Any, max_range: float) -> Any:
 
 
 def seen_from(points: Any, pose: Any) -> Any:
-    """Give where points of a robot's frame are in the frame of its pose."""
+    """Return where points of a robot's frame are in the frame of its pose."""
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     return points @ np.array([[cos, sin], [-sin, cos]]) + np.asarray(pose[:2])
 
@@ -140,14 +140,14 @@ def expected_ranges(
     *,
     max_range: Annotated[float, Interval(gt=0), Unit("m")] = 30.0,
 ) -> Ranges:
-    """Give what a laser would measure if nothing were there but the walls of a map.
+    """Return what a laser would measure if nothing were there but the walls of a map.
 
-    Fires once for each pose. What is measured nearer than that is something else; what is measured farther away says
-    that the pose or the map is wrong.
+    Fires once per pose. What is measured nearer than that is something else; what is measured farther away says that
+    the pose or the map is wrong.
 
     Args:
-      pose: of the laser in the map.
-      angles: of the beams, in radians, counter-clockwise from straight ahead.
+      pose: pose of the laser in the map.
+      angles: angles of the beams, in radians, counter-clockwise from straight ahead.
       segments: the walls.
       max_range: how far the laser sees.
 
@@ -182,15 +182,15 @@ def find_disks(
 ) -> list[Disk]:
     """Find round things of a known size among the points of a scan.
 
-    Fires once for each set of points. Points that follow each other closely belong together; a circle is laid through
-    each such group, behind it as seen by the laser.
+    Fires once per set of points. Points that follow each other closely belong together; a circle is fitted to each such
+    group, on its far side as seen by the laser.
 
     Args:
       points: in the order of the beams, without those that belong to something known.
       seen_from: where the laser is, one point; without this input it is at the origin.
       radius: of what is looked for, in metres.
       gap: how far neighbouring points of one thing are apart at most, in metres.
-      least: so many points make one.
+      least: minimum number of points of one.
       tolerance: how far the points may lie off the circle, root of the mean of squares, in metres.
 
     Returns:

@@ -30,7 +30,7 @@ class _Track:
         self.seen, self.missed = now, 0
 
     def expected(self, dt: float) -> Any:
-        """Give where it should be now; what is out of sight stands."""
+        """Return where it should be now; what is out of sight stands."""
         return self.at if self.missed else self.at + self.speed * dt
 
     def correct(self, disk: Disk, dt: float, now: float, fastest: float) -> None:
@@ -50,7 +50,7 @@ class _Track:
         self.missed += 1
 
     def tell(self) -> Disk:
-        """Give it as it is known."""
+        """Return it as it is known."""
         x, y = map(float, self.at)
         moves = not self.missed and float(np.hypot(*self.speed)) > _STILL
         vx, vy = map(float, self.speed) if moves else (0.0, 0.0)
@@ -80,9 +80,9 @@ class DiskTracks:
 
         Args:
           seen: in the map frame.
-          pose: of the laser, in the map frame.
-          ranges: of the scan.
-          angles: of the scan.
+          pose: pose of the laser, in the map frame.
+          ranges: ranges of the scan.
+          angles: angles of the scan.
           now: when it was measured.
         """
         dt, self._last = max(now - self._last, 1e-3), now
@@ -123,18 +123,18 @@ def _is_hidden(at: Any, pose: Any, ranges: Any, angles: Any, radius: float) -> b
 class TrackDisks(Node):
     """Follow round things from scan to scan, also those that are out of sight for a while.
 
-    Fires once for each list of disks with the scan in which they were found. A disk that something else hides, or that
-    is where the laser does not look, is kept where it was seen last, as standing; one that should be seen and is not
-    has gone.
+    Fires once per list of disks with the scan in which they were found. A disk that something else hides, or that is
+    where the laser does not look, is kept where it was seen last, as standing; one that should be seen and is not has
+    gone.
 
     Attributes:
       memory: for how long a disk is kept that cannot be seen.
       fastest: of the disks.
       radius: of the disks.
       seen: in the map frame.
-      pose: of the laser, in the map frame.
+      pose: pose of the laser, in the map frame.
       ranges: how far each beam went, in metres.
-      angles: of the beams, in radians, counter-clockwise from straight ahead.
+      angles: angles of the beams, in radians, counter-clockwise from straight ahead.
       disks: with their velocities.
 
     Raises:

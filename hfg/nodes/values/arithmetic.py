@@ -1,4 +1,4 @@
-"""Calculating with numbers: one, two or many at a time. Stands on functions and ports."""
+"""Calculating with numbers: one, two or many at a time. Depends on functions and ports."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ __all__ = [
 
 @node
 def add(a: float, b: float) -> float:
-    """Give the sum of two numbers.
+    """Return the sum of two numbers.
 
     Args:
       a: the first number.
@@ -56,7 +56,7 @@ def add(a: float, b: float) -> float:
 
 @node
 def subtract(a: float, b: float) -> float:
-    """Give the difference of two numbers, a - b.
+    """Return the difference of two numbers, a - b.
 
     Args:
       a: what is subtracted from.
@@ -70,7 +70,7 @@ def subtract(a: float, b: float) -> float:
 
 @node
 def multiply(a: float, b: float) -> float:
-    """Give the product of two numbers.
+    """Return the product of two numbers.
 
     Args:
       a: the first number.
@@ -86,7 +86,7 @@ def multiply(a: float, b: float) -> float:
 
 @node
 def divide(a: float, b: float) -> float:
-    """Give the quotient of two numbers, a / b.
+    """Return the quotient of two numbers, a / b.
 
     Args:
       a: the dividend.
@@ -101,7 +101,7 @@ def divide(a: float, b: float) -> float:
 
 @node
 def modulo(a: float, b: float) -> float:
-    """Give what is left of a after taking b as often as it goes; it has the sign of b, as in Python.
+    """Return what is left of a after taking b as often as it goes; it has the sign of b, as in Python.
 
     Args:
       a: the dividend.
@@ -116,7 +116,7 @@ def modulo(a: float, b: float) -> float:
 
 @node
 def power(a: float, b: float) -> float:
-    """Give a to the power of b, as a float.
+    """Return a to the power of b, as a float.
 
     Args:
       a: the base.
@@ -189,7 +189,7 @@ def bitwise(a: int, b: int, *, operation: Literal["and", "or", "xor"] = "and") -
 
 @node(inputs={"values": Inputs(float, 2)}, outputs=float)
 def sum_of(*values: float) -> float:
-    """Give the sum of the numbers at all inputs.
+    """Return the sum of the numbers at all inputs.
 
     Fires once all inputs hold a token; silence at one of them is silence, and the end of one is the end.
 
@@ -206,7 +206,7 @@ def sum_of(*values: float) -> float:
 
 @node(inputs={"values": Inputs(float, 2)}, outputs=float)
 def product_of(*values: float) -> float:
-    """Give the product of the numbers at all inputs.
+    """Return the product of the numbers at all inputs.
 
     Fires once all inputs hold a token; silence at one of them is silence, and the end of one is the end.
 
@@ -223,7 +223,7 @@ def product_of(*values: float) -> float:
 
 @node(inputs={"values": Inputs(float, 2)}, outputs=float)
 def mean_of(*values: float) -> float:
-    """Give the mean of the numbers at all inputs.
+    """Return the mean of the numbers at all inputs.
 
     Fires once all inputs hold a token; silence at one of them is silence, and the end of one is the end.
 
@@ -238,7 +238,7 @@ def mean_of(*values: float) -> float:
 
 @node(inputs={"values": Inputs(float, 2)}, outputs=float)
 def smallest(*values: float) -> float:
-    """Give the smallest of the numbers at all inputs; of a NaN nobody knows.
+    """Return the smallest of the numbers at all inputs; with a NaN, it is undefined.
 
     Fires once all inputs hold a token; silence at one of them is silence, and the end of one is the end.
 
@@ -250,7 +250,7 @@ def smallest(*values: float) -> float:
 
 @node(inputs={"values": Inputs(float, 2)}, outputs=float)
 def largest(*values: float) -> float:
-    """Give the largest of the numbers at all inputs; of a NaN nobody knows.
+    """Return the largest of the numbers at all inputs; with a NaN, it is undefined.
 
     Fires once all inputs hold a token; silence at one of them is silence, and the end of one is the end.
 
@@ -265,7 +265,7 @@ def largest(*values: float) -> float:
 
 @node
 def negate(value: float) -> float:
-    """Give a number with the other sign.
+    """Return a number with the other sign.
 
     Args:
       value: a number.
@@ -277,7 +277,7 @@ def negate(value: float) -> float:
 
 @node
 def invert(value: float) -> float:
-    """Give one divided by a number.
+    """Return one divided by a number.
 
     Args:
       value: a number.
@@ -293,7 +293,7 @@ def invert(value: float) -> float:
 
 @node
 def absolute(value: float) -> float:
-    """Give a number without its sign.
+    """Return a number without its sign.
 
     Args:
       value: a number.
@@ -384,7 +384,7 @@ def function_of(
         "sign",
     ] = "sqrt",
 ) -> float:
-    """Give a function of a number, as Python's `math` has it.
+    """Return a function of a number, as Python's `math` has it.
 
     Args:
       value: a number; angles are in radians.
@@ -401,7 +401,7 @@ def function_of(
 def scale(
     value: float, *, factor: Annotated[float, Unit("1")] = 1.0, offset: Annotated[float, Unit("of the value")] = 0.0
 ) -> float:
-    """Give a number times a factor, plus an offset.
+    """Return a number times a factor, plus an offset.
 
     Args:
       value: a number.
@@ -478,7 +478,7 @@ def round_to(value: float, *, step: Annotated[float, Interval(gt=0), Unit("of th
 
 @node
 def deadband(value: float, *, width: Annotated[float, Interval(ge=0), Unit("of the value")] = 0.1) -> float:
-    """Give 0 for numbers near to it, and bring others nearer by as much, so that there is no jump.
+    """Return 0 for numbers near to it, and bring others nearer by as much, so that there is no jump.
 
     Args:
       value: a number, such as the deflection of a stick.

@@ -1,6 +1,6 @@
 """Values that are set by hand, and change while the graph runs: as sources, and given out at a signal.
 
-Stands on nodetype and ports.
+Depends on nodetype and ports.
 """
 
 from __future__ import annotations
@@ -62,12 +62,15 @@ def as_array(values: Any, axes: int) -> npt.NDArray[np.float64]:
 
 
 class _Constant(Node):
-    """Gives its value again and again; `told` is what `changed` told of last, in a list, since it may be anything."""
+    """Sends its value again and again.
+
+    `told` is the value that `changed` sent last, in a list because it may be anything.
+    """
 
     told = State(factory=list[Any])
 
     def _give(self, found: Any, value: T, changed: EventPort[T]) -> T:
-        """Give a value that is made of what the parameter was found to be, which can be compared."""
+        """Return a value that is made of what the parameter was found to be, which can be compared."""
         if self.told and self.told[0] is not found and self.told[0] != found:  # a NaN differs from itself
             changed.trigger(value)
         self.told = [found]
@@ -75,15 +78,15 @@ class _Constant(Node):
 
 
 class ConstantBool(_Constant):
-    """Give a truth value that is set by hand; a source without end.
+    """Send a truth value that is set by hand; an endless source.
 
-    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
-    that. A new value is given from the next firing on.
+    It sends the value as often as its consumers and `max_rate_hz` allow. Joined with a stream, it provides one value
+    per token. A new value takes effect with the next firing.
 
     Attributes:
-      value: what is given.
+      value: the value to send.
       out: the value.
-      changed: the new value, as it is given for the first time.
+      changed: the new value, when it is sent for the first time.
     """
 
     value = Parameter(False)
@@ -91,20 +94,20 @@ class ConstantBool(_Constant):
     changed = Event(bool)
 
     def process(self) -> bool:
-        """Give the value."""
+        """Return the value."""
         return self._give(self.value, self.value, self.changed)
 
 
 class ConstantInt(_Constant):
-    """Give a whole number that is set by hand; a source without end.
+    """Send a whole number that is set by hand; an endless source.
 
-    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
-    that. A new value is given from the next firing on.
+    It sends the value as often as its consumers and `max_rate_hz` allow. Joined with a stream, it provides one value
+    per token. A new value takes effect with the next firing.
 
     Attributes:
-      value: what is given.
+      value: the value to send.
       out: the value.
-      changed: the new value, as it is given for the first time.
+      changed: the new value, when it is sent for the first time.
 
     CS::APEX: csapex::IntInput.
     """
@@ -114,20 +117,20 @@ class ConstantInt(_Constant):
     changed = Event(int)
 
     def process(self) -> int:
-        """Give the value."""
+        """Return the value."""
         return self._give(self.value, self.value, self.changed)
 
 
 class ConstantFloat(_Constant):
-    """Give a number that is set by hand; a source without end.
+    """Send a number that is set by hand; an endless source.
 
-    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
-    that. A new value is given from the next firing on.
+    It sends the value as often as its consumers and `max_rate_hz` allow. Joined with a stream, it provides one value
+    per token. A new value takes effect with the next firing.
 
     Attributes:
-      value: what is given.
+      value: the value to send.
       out: the value.
-      changed: the new value, as it is given for the first time.
+      changed: the new value, when it is sent for the first time.
 
     CS::APEX: csapex::DoubleInput.
     """
@@ -137,20 +140,20 @@ class ConstantFloat(_Constant):
     changed = Event(float)
 
     def process(self) -> float:
-        """Give the value."""
+        """Return the value."""
         return self._give(self.value, self.value, self.changed)
 
 
 class ConstantText(_Constant):
-    """Give a text that is set by hand; a source without end.
+    """Send a text that is set by hand; an endless source.
 
-    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
-    that. A new value is given from the next firing on.
+    It sends the value as often as its consumers and `max_rate_hz` allow. Joined with a stream, it provides one value
+    per token. A new value takes effect with the next firing.
 
     Attributes:
-      value: what is given.
+      value: the value to send.
       out: the value.
-      changed: the new value, as it is given for the first time.
+      changed: the new value, when it is sent for the first time.
 
     CS::APEX: csapex::TextInput.
     """
@@ -160,20 +163,20 @@ class ConstantText(_Constant):
     changed = Event(str)
 
     def process(self) -> str:
-        """Give the value."""
+        """Return the value."""
         return self._give(self.value, self.value, self.changed)
 
 
 class ConstantVector(_Constant):
-    """Give a vector that is set by hand, as an array; a source without end.
+    """Send a vector that is set by hand, as an array; an endless source.
 
-    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
-    that. A new value is given from the next firing on.
+    It sends the value as often as its consumers and `max_rate_hz` allow. Joined with a stream, it provides one value
+    per token. A new value takes effect with the next firing.
 
     Attributes:
-      value: what is given, any number of numbers.
+      value: the value to send, any number of numbers.
       out: the value, an array of float64 with one axis.
-      changed: the new value, as it is given for the first time.
+      changed: the new value, when it is sent for the first time.
 
     CS::APEX: csapex::VectorInput.
     """
@@ -185,20 +188,20 @@ class ConstantVector(_Constant):
     changed = Event(VectorArray)
 
     def process(self) -> VectorArray:
-        """Give the value."""
+        """Return the value."""
         return self._give(tuple(self.value), as_array(self.value, 1), self.changed)
 
 
 class ConstantMatrix(_Constant):
-    """Give a matrix that is set by hand, as an array; a source without end.
+    """Send a matrix that is set by hand, as an array; an endless source.
 
-    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
-    that. A new value is given from the next firing on.
+    It sends the value as often as its consumers and `max_rate_hz` allow. Joined with a stream, it provides one value
+    per token. A new value takes effect with the next firing.
 
     Attributes:
-      value: what is given, row by row, all rows of one length.
+      value: the value to send, row by row, all rows of one length.
       out: the value, an array of float64, rows x columns.
-      changed: the new value, as it is given for the first time.
+      changed: the new value, when it is sent for the first time.
 
     CS::APEX: csapex::MatrixInput.
     """
@@ -208,20 +211,20 @@ class ConstantMatrix(_Constant):
     changed = Event(MatrixArray)
 
     def process(self) -> MatrixArray:
-        """Give the value."""
+        """Return the value."""
         return self._give(tuple(map(tuple, self.value)), as_array(self.value, 2), self.changed)
 
 
 class ConstantColour(_Constant):
-    """Give a colour that is set by hand; a source without end.
+    """Send a colour that is set by hand; an endless source.
 
-    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
-    that. A new value is given from the next firing on.
+    It sends the value as often as its consumers and `max_rate_hz` allow. Joined with a stream, it provides one value
+    per token. A new value takes effect with the next firing.
 
     Attributes:
-      value: what is given: red, green and blue, 0 to 255 each.
+      value: the value to send: red, green and blue, 0 to 255 each.
       out: the value.
-      changed: the new value, as it is given for the first time.
+      changed: the new value, when it is sent for the first time.
     """
 
     value = Parameter(Colour(255, 255, 255))
@@ -229,7 +232,7 @@ class ConstantColour(_Constant):
     changed = Event(Colour)
 
     def process(self) -> Colour:
-        """Give the value."""
+        """Return the value."""
         return self._give(self.value, self.value, self.changed)
 
 
@@ -237,11 +240,11 @@ class ConstantColour(_Constant):
 
 
 class BoolOnTrigger(Node):
-    """Give a truth value at each signal.
+    """Send a truth value at each signal.
 
     Attributes:
-      value: what is given.
-      trigger: any token makes it given.
+      value: the value to send.
+      trigger: any token makes the node send the value.
       given: the value.
     """
 
@@ -250,16 +253,16 @@ class BoolOnTrigger(Node):
 
     @slot
     def trigger(self) -> None:
-        """Give the value."""
+        """Send the value."""
         self.given.trigger(self.value)
 
 
 class IntOnTrigger(Node):
-    """Give a whole number at each signal.
+    """Send a whole number at each signal.
 
     Attributes:
-      value: what is given.
-      trigger: any token makes it given.
+      value: the value to send.
+      trigger: any token makes the node send the value.
       given: the value.
     """
 
@@ -268,16 +271,16 @@ class IntOnTrigger(Node):
 
     @slot
     def trigger(self) -> None:
-        """Give the value."""
+        """Send the value."""
         self.given.trigger(self.value)
 
 
 class FloatOnTrigger(Node):
-    """Give a number at each signal.
+    """Send a number at each signal.
 
     Attributes:
-      value: what is given.
-      trigger: any token makes it given.
+      value: the value to send.
+      trigger: any token makes the node send the value.
       given: the value.
     """
 
@@ -286,16 +289,16 @@ class FloatOnTrigger(Node):
 
     @slot
     def trigger(self) -> None:
-        """Give the value."""
+        """Send the value."""
         self.given.trigger(self.value)
 
 
 class TextOnTrigger(Node):
-    """Give a text at each signal.
+    """Send a text at each signal.
 
     Attributes:
-      value: what is given.
-      trigger: any token makes it given.
+      value: the value to send.
+      trigger: any token makes the node send the value.
       given: the value.
     """
 
@@ -304,16 +307,16 @@ class TextOnTrigger(Node):
 
     @slot
     def trigger(self) -> None:
-        """Give the value."""
+        """Send the value."""
         self.given.trigger(self.value)
 
 
 class VectorOnTrigger(Node):
-    """Give a vector at each signal, as an array.
+    """Send a vector at each signal, as an array.
 
     Attributes:
-      value: what is given, any number of numbers.
-      trigger: any token makes it given.
+      value: the value to send, any number of numbers.
+      trigger: any token makes the node send the value.
       given: the value, an array of float64 with one axis.
     """
 
@@ -324,16 +327,16 @@ class VectorOnTrigger(Node):
 
     @slot
     def trigger(self) -> None:
-        """Give the value."""
+        """Send the value."""
         self.given.trigger(as_array(self.value, 1))
 
 
 class MatrixOnTrigger(Node):
-    """Give a matrix at each signal, as an array.
+    """Send a matrix at each signal, as an array.
 
     Attributes:
-      value: what is given, row by row, all rows of one length.
-      trigger: any token makes it given.
+      value: the value to send, row by row, all rows of one length.
+      trigger: any token makes the node send the value.
       given: the value, an array of float64, rows x columns.
     """
 
@@ -342,16 +345,16 @@ class MatrixOnTrigger(Node):
 
     @slot
     def trigger(self) -> None:
-        """Give the value."""
+        """Send the value."""
         self.given.trigger(as_array(self.value, 2))
 
 
 class ColourOnTrigger(Node):
-    """Give a colour at each signal.
+    """Send a colour at each signal.
 
     Attributes:
-      value: what is given: red, green and blue, 0 to 255 each.
-      trigger: any token makes it given.
+      value: the value to send: red, green and blue, 0 to 255 each.
+      trigger: any token makes the node send the value.
       given: the value.
     """
 
@@ -360,13 +363,13 @@ class ColourOnTrigger(Node):
 
     @slot
     def trigger(self) -> None:
-        """Give the value."""
+        """Send the value."""
         self.given.trigger(self.value)
 
 
 @node
 def replace_by(value: object, *, by: Any = 0) -> Any:
-    """Give the same value for each token, whatever came: a constant in step with a stream.
+    """Return the same value for each token, whatever came: a constant in step with a stream.
 
     Args:
       value: anything; silence stays silence.

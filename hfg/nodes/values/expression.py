@@ -1,6 +1,6 @@
 """Formulas that are written in a parameter: never handed to Python, so that they can do nothing but calculate.
 
-Stands on functions and ports.
+Depends on functions and ports.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ _DEEPEST: Final = 50
 
 
 class _NoFormula(ValueError):
-    """What is written is no formula."""
+    """The text is not a formula."""
 
 
 @functools.lru_cache(maxsize=256)
@@ -66,13 +66,13 @@ def read_formula(text: str) -> tuple[Calculation, int]:
     """Make a function of a formula, and say how many values it needs.
 
     Raises:
-      ValueError: it is none; the sentence says where.
+      ValueError: it is none; the message says where.
     """
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise _NoFormula(
-            f"{text!r:.80} is no formula ({error.__class__.__name__}); write one as in 'a * 2 + b'"
+            f"{text!r:.80} is not a formula ({error.__class__.__name__}); write one as in 'a * 2 + b'"
         ) from None
     needed = 0
 

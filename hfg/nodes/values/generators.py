@@ -1,6 +1,6 @@
 """Sources of numbers: ranges that end, lists, chance that is the same in every run, and waves.
 
-Stands on nodetype, functions and ports.
+Depends on nodetype, functions and ports.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class IntRange(Node):
     """Count through a range of whole numbers, then end.
 
     Works as Python's `range`: the first number is `start`, each is `step` more than the one before, and `stop` is not
-    reached, unless it is closed. The slot `reset` begins anew. Parameters that change take effect with the next number.
+    reached, unless it is closed. The slot `reset` starts over. Parameters that change take effect with the next number.
 
     Attributes:
       start: the first number.
@@ -81,7 +81,7 @@ class FloatRange(Node):
     """Count through a range of numbers, then end.
 
     The numbers are `start + n * step`, so that no error adds up; one that is nearer to `stop` than a billionth of a
-    step counts as `stop`, which is not reached unless the range is closed. The slot `reset` begins anew.
+    step counts as `stop`, which is not reached unless the range is closed. The slot `reset` starts over.
 
     Attributes:
       start: the first number.
@@ -117,7 +117,7 @@ class FloatRange(Node):
 
 
 class LinearSpace(Node):
-    """Give so many numbers at equal distances, both ends among them, then end.
+    """Send a number of equally spaced values, including both ends, then end.
 
     Attributes:
       start: the first number.
@@ -132,7 +132,7 @@ class LinearSpace(Node):
     count = Parameter(11, Interval(ge=1))
 
     def process(self) -> Iterator[float]:
-        """Give them."""
+        """Yield them."""
         last = self.count - 1
         for number in range(self.count):
             # Weighted ends instead of steps: the last one is met exactly, and nothing overflows between the two.
@@ -140,13 +140,13 @@ class LinearSpace(Node):
 
 
 class ListSource(Node):
-    """Give the values of a list one by one, then end.
+    """Send the values of a list one by one, then end.
 
     None in the list is silence.
 
     Attributes:
       values: what is given.
-      times: how often the list is gone through; 0 is without end.
+      times: how often the list is gone through; 0 means without end.
       out: the values.
     """
 
@@ -155,7 +155,7 @@ class ListSource(Node):
     times = Parameter(1, Interval(ge=0))
 
     def process(self) -> Iterator[Any]:
-        """Give them."""
+        """Yield them."""
         values = list(self.values)
         turn = 0
         while values and (self.times == 0 or turn < self.times):
@@ -178,15 +178,15 @@ class _Chance(Node):
 
 
 class RandomUniform(_Chance):
-    """Give random numbers that are all equally likely between two limits.
+    """Send random numbers that are all equally likely between two limits.
 
-    Every run gives the same ones, and so do two nodes with the same seed.
+    Every run sends the same ones, and so do two nodes with the same seed.
 
     Attributes:
       low: the lower limit.
       high: the upper limit; below the lower one they change places.
-      seed: begins another row of numbers; with None no two runs are alike.
-      count: how many are given before it ends; 0 is without end.
+      seed: another seed gives other numbers; with None, every run has different ones.
+      count: how many are sent before it ends; 0 means without end.
       out: the numbers.
     """
 
@@ -202,15 +202,15 @@ class RandomUniform(_Chance):
 
 
 class RandomNormal(_Chance):
-    """Give random numbers of the normal distribution.
+    """Send random numbers of the normal distribution.
 
-    Every run gives the same ones, and so do two nodes with the same seed.
+    Every run sends the same ones, and so do two nodes with the same seed.
 
     Attributes:
       mean: their mean.
       sigma: their standard deviation.
-      seed: begins another row of numbers; with None no two runs are alike.
-      count: how many are given before it ends; 0 is without end.
+      seed: another seed gives other numbers; with None, every run has different ones.
+      count: how many are sent before it ends; 0 means without end.
       out: the numbers.
     """
 
@@ -226,15 +226,15 @@ class RandomNormal(_Chance):
 
 
 class RandomInt(_Chance):
-    """Give random whole numbers that are all equally likely, both limits among them.
+    """Send random whole numbers that are all equally likely, both limits among them.
 
-    Every run gives the same ones, and so do two nodes with the same seed.
+    Every run sends the same ones, and so do two nodes with the same seed.
 
     Attributes:
       low: the smallest.
       high: the largest; below the smallest they change places.
-      seed: begins another row of numbers; with None no two runs are alike.
-      count: how many are given before it ends; 0 is without end.
+      seed: another seed gives other numbers; with None, every run has different ones.
+      count: how many are sent before it ends; 0 means without end.
       out: the numbers.
     """
 
@@ -250,14 +250,14 @@ class RandomInt(_Chance):
 
 
 class RandomBool(_Chance):
-    """Give random truth values.
+    """Send random truth values.
 
-    Every run gives the same ones, and so do two nodes with the same seed.
+    Every run sends the same ones, and so do two nodes with the same seed.
 
     Attributes:
       probability: how likely true is, 0 to 1.
-      seed: begins another row of values; with None no two runs are alike.
-      count: how many are given before it ends; 0 is without end.
+      seed: another seed gives other values; with None, every run has different ones.
+      count: how many are sent before it ends; 0 means without end.
       out: the values.
     """
 
@@ -272,14 +272,14 @@ class RandomBool(_Chance):
 
 
 class RandomChoice(_Chance):
-    """Give values of a list at random, all equally likely.
+    """Send values of a list at random, all equally likely.
 
-    Every run gives the same ones, and so do two nodes with the same seed.
+    Every run sends the same ones, and so do two nodes with the same seed.
 
     Attributes:
       choices: what is chosen from; a value that is there twice is twice as likely.
-      seed: begins another row of values; with None no two runs are alike.
-      count: how many are given before it ends; 0 is without end.
+      seed: another seed gives other values; with None, every run has different ones.
+      count: how many are sent before it ends; 0 means without end.
       out: the values.
     """
 
@@ -301,7 +301,7 @@ class AddNoise(Node):
     Attributes:
       value: a number.
       sigma: the standard deviation of the noise, in the unit of the value.
-      seed: begins another row of numbers; with None no two runs are alike.
+      seed: another seed gives other numbers; with None, every run has different ones.
       noisy: the number with the noise.
 
     Raises:
@@ -341,7 +341,7 @@ def waveform(
     offset: Annotated[float, Unit("of the value")] = 0.0,
     phase: Annotated[float, Unit("1")] = 0.0,
 ) -> float:
-    """Give the height of a wave at a time.
+    """Return the height of a wave at a time.
 
     All shapes begin at the offset and rise, apart from the square, which begins high.
 

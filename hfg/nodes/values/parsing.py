@@ -1,6 +1,6 @@
 """Values of one type into another: texts into numbers and back, numbers into whole ones, anything into JSON.
 
-A text that cannot be read is no error of the graph but an event, for texts come from outside. Stands on nodetype,
+A text that cannot be read is an event, not an error of the graph, because texts come from outside. Depends on nodetype,
 functions, ports, msgspec and numpy.
 """
 
@@ -37,7 +37,7 @@ __all__ = [
 
 
 class ParseInt(Node):
-    """Read whole numbers; a text that is none is silent and signalled.
+    """Read whole numbers; other texts are silent and signalled.
 
     Blanks around it and underscores between digits are allowed, as in Python.
 
@@ -45,7 +45,7 @@ class ParseInt(Node):
       text: such as " -12 ".
       base: of the digits, 2 to 36; 0 reads prefixes such as 0x.
       number: what it says.
-      invalid: a text that is no whole number.
+      invalid: a text that is not a whole number.
 
     CS::APEX: csapex::StringToInt, csapex::TextConvert.
     """
@@ -65,14 +65,14 @@ class ParseInt(Node):
 
 
 class ParseFloat(Node):
-    """Read numbers; a text that is none is silent and signalled.
+    """Read numbers; other texts are silent and signalled.
 
     Attributes:
       text: such as "1.5e3".
-      finite: whether "inf" and "nan" are no numbers.
-      decimal_comma: whether the comma stands before the fraction, and points are no part of a number.
+      finite: whether "inf" and "nan" are not numbers.
+      decimal_comma: whether the comma stands before the fraction, and points are not part of a number.
       number: what it says.
-      invalid: a text that is no number.
+      invalid: a text that is not a number.
     """
 
     text = Input(str)
@@ -103,7 +103,7 @@ _WORDS: Final = {
 
 
 class ParseBool(Node):
-    """Read truth values; a text that is none is silent and signalled.
+    """Read truth values; other texts are silent and signalled.
 
     True is true, yes, on, t, y or 1, false is false, no, off, f, n or 0, in small or large letters.
 
@@ -126,14 +126,14 @@ class ParseBool(Node):
 
 
 class ParseJson(Node):
-    """Read JSON; a text that is none is silent and signalled.
+    """Read JSON; other texts are silent and signalled.
 
-    `null` alone is silent, for None is no value in a graph; inside of lists and objects it is None.
+    A plain `null` is silent because None is not a value in a graph; inside lists and objects it is None.
 
     Attributes:
       text: one JSON value.
       parsed: lists, dicts, texts, numbers and truth values.
-      invalid: a text that is no JSON, or nested too deeply.
+      invalid: a text that is not JSON, or nested too deeply.
     """
 
     text = Input(str)
@@ -150,7 +150,7 @@ class ParseJson(Node):
 
 
 def plain(value: Any) -> Any:
-    """Give what JSON has instead of a value of numpy.
+    """Return what JSON has instead of a value of numpy.
 
     Raises:
       TypeError: there is nothing.
@@ -168,7 +168,7 @@ def json_bytes(value: Any) -> bytes:
     """Write a value as JSON.
 
     Raises:
-      TypeError: it has no form in JSON.
+      TypeError: it cannot be represented in JSON.
       ValueError: nor has a number, text or key in it, or it is nested too deeply.
     """
     try:
@@ -185,11 +185,11 @@ def to_json(value: object, *, indent: Annotated[int, Interval(ge=0, le=16)] = 0)
     infinity become null.
 
     Args:
-      value: anything that has a form in JSON.
+      value: anything that can be represented in JSON.
       indent: blanks for each level, on lines of their own; 0 is one line.
 
     Raises:
-      TypeError: it has no form in JSON.
+      TypeError: it cannot be represented in JSON.
       ValueError: a number, text or key in it has none, or it is nested too deeply.
     """
     data = json_bytes(value)
@@ -205,8 +205,8 @@ def to_int(value: float, *, rounding: Literal["nearest", "down", "up", "towards 
       rounding: how; "nearest" takes the even one of two that are as near.
 
     Raises:
-      ValueError: a NaN is no number.
-      OverflowError: infinity is no whole number.
+      ValueError: a NaN is not a number.
+      OverflowError: infinity is not a whole number.
     """
     match rounding:
         case "down":
@@ -221,7 +221,7 @@ def to_int(value: float, *, rounding: Literal["nearest", "down", "up", "towards 
 
 @node
 def to_float(value: float) -> float:
-    """Make a float of a whole number or truth value, for what takes nothing else.
+    """Convert an integer or boolean to a float, for nodes that accept only floats.
 
     Args:
       value: a number.
@@ -297,9 +297,9 @@ def decode_text(
     Args:
       data: the bytes.
       encoding: how the text was written.
-      errors: what becomes of bytes that are none of it: an error, a replacement character, or nothing.
+      errors: what to do with invalid bytes: raise an error, insert a replacement character, or omit them.
 
     Raises:
-      ValueError: the bytes are no text of that encoding, and errors are strict.
+      ValueError: the bytes are not text of that encoding, and errors are strict.
     """
     return data.decode(encoding, errors)

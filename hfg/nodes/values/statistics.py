@@ -1,6 +1,6 @@
-"""What can be said of a stream of numbers: so far, over the last ones, and how they change.
+"""Statistics of a stream of numbers: of all so far, of the last ones, and of their changes.
 
-Stands on nodetype and ports.
+Depends on nodetype and ports.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ __all__ = [
 
 
 class Statistics(Node):
-    """Give the mean and the spread of all numbers so far.
+    """Send the mean and the spread of all numbers so far.
 
     Calculated by Welford's method, which stays exact over many numbers. Each token is answered; a NaN makes NaN of
     everything until `clear`.
@@ -45,7 +45,7 @@ class Statistics(Node):
       std: their standard deviation (of a sample, divided by n - 1); 0 of a single number.
       variance: its square.
       count: how many numbers there were.
-      clear: begins anew.
+      clear: starts over.
 
     Raises:
       OverflowError: a whole number is too large for a float.
@@ -74,12 +74,12 @@ class Statistics(Node):
 
     @slot
     def clear(self) -> None:
-        """Begin anew."""
+        """Start over."""
         self.seen, self.centre, self.squares = 0, 0.0, 0.0
 
 
 class Extremes(Node):
-    """Give the smallest and the largest number so far, and signal each new one.
+    """Send the smallest and the largest number so far, and signal each new one.
 
     A NaN is passed over. The first number is both.
 
@@ -89,7 +89,7 @@ class Extremes(Node):
       largest: of all numbers so far.
       new_smallest: the number, where it is smaller than all before.
       new_largest: the number, where it is larger than all before.
-      clear: begins anew.
+      clear: starts over.
     """
 
     value = Input(float)
@@ -114,17 +114,17 @@ class Extremes(Node):
 
     @slot
     def clear(self) -> None:
-        """Begin anew."""
+        """Start over."""
         self.low = self.high = None
 
 
 class CumulativeSum(Node):
-    """Give the sum of all numbers so far.
+    """Send the sum of all numbers so far.
 
     Attributes:
       value: a number.
       total: the sum, this number among them.
-      clear: begins anew at 0.
+      clear: starts over at 0.
 
     Raises:
       OverflowError: a whole number is too large for a float.
@@ -141,7 +141,7 @@ class CumulativeSum(Node):
 
     @slot
     def clear(self) -> None:
-        """Begin anew."""
+        """Start over."""
         self.sum = 0
 
 
@@ -158,7 +158,7 @@ class _Window(Node):
 
 
 class WindowStatistics(_Window):
-    """Give mean, median, spread, smallest and largest of the last numbers.
+    """Send mean, median, spread, smallest and largest of the last numbers.
 
     Before there are so many, of those that there are.
 
@@ -199,7 +199,7 @@ class WindowStatistics(_Window):
 
 
 class MovingAverage(_Window):
-    """Give the mean of the last numbers; before there are so many, of those that there are.
+    """Send the mean of the last numbers; before there are so many, of those that there are.
 
     Attributes:
       value: a number.
@@ -227,7 +227,7 @@ class MovingAverage(_Window):
 
 
 class MovingMedian(_Window):
-    """Give the median of the last numbers, which single wrong ones do not move.
+    """Send the median of the last numbers, which single wrong ones do not move.
 
     Before there are so many, of those that there are.
 
@@ -258,15 +258,15 @@ class MovingMedian(_Window):
 class Histogram(Node):
     """Count how many numbers so far fell into each of several equal ranges.
 
-    A bin holds its lower end; the last one its upper end too. The list begins anew when limits or bins are changed.
+    A bin holds its lower end; the last one its upper end too. The list starts over when limits or bins are changed.
 
     Attributes:
       value: a number; what lies outside of the limits, and a NaN, is passed over.
       lower: where the first bin begins, in the unit of the value.
       upper: where the last bin ends.
-      bins: how many.
+      bins: number of bins.
       counts: how many numbers each bin has had, with each token.
-      clear: begins anew.
+      clear: starts over.
 
     Raises:
       ValueError: the upper limit is not above the lower one.
@@ -298,7 +298,7 @@ class Histogram(Node):
 
     @slot
     def clear(self) -> None:
-        """Begin anew."""
+        """Start over."""
         self.made_for = None
 
 
@@ -311,7 +311,7 @@ class ExponentialSmoothing(Node):
       value: a number.
       alpha: how much of a new number is taken, 0 (none) to 1 (no smoothing).
       smooth: the smoothed number.
-      clear: forgets what was before.
+      clear: forgets the previous value.
 
     Raises:
       OverflowError: a whole number is too large for a float.
@@ -329,7 +329,7 @@ class ExponentialSmoothing(Node):
 
     @slot
     def clear(self) -> None:
-        """Forget what was before."""
+        """Forget the previous value."""
         self.last = None
 
 
@@ -343,7 +343,7 @@ class _Timed(Node):
     before = State(0.0)
 
     def _passed(self, token: Token[float]) -> float | None:
-        """Give the seconds since the last token by their stamps; None of the first, or if no time has passed."""
+        """Return the seconds since the last token by their stamps; None of the first, or if no time has passed."""
         last, now = self.stamp, token.stamp
         if last is not None and now <= last:
             return None
@@ -361,7 +361,7 @@ class LowPass(_Timed):
       value: a number.
       time_constant_s: how slowly it follows; 0 passes on everything.
       smooth: the smoothed number.
-      clear: forgets what was before.
+      clear: forgets the previous value.
 
     Raises:
       OverflowError: a whole number is too large for a float.
@@ -383,12 +383,12 @@ class LowPass(_Timed):
 
     @slot
     def clear(self) -> None:
-        """Forget what was before."""
+        """Forget the previous value."""
         self.stamp = None
 
 
 class Derivative(_Timed):
-    """Give by how much a number changes in a second.
+    """Send by how much a number changes in a second.
 
     Times are those of the tokens' stamps. Silent for the first number, and for one that is not newer than the one
     before, which is passed over.
@@ -396,7 +396,7 @@ class Derivative(_Timed):
     Attributes:
       value: a number.
       slope: the change since the number before, for each second, in the unit of the value.
-      clear: forgets what was before.
+      clear: forgets the previous value.
 
     Raises:
       OverflowError: a whole number is too large for a float.
@@ -418,17 +418,17 @@ class Derivative(_Timed):
 
     @slot
     def clear(self) -> None:
-        """Forget what was before."""
+        """Forget the previous value."""
         self.stamp = None
 
 
 class Difference(Node):
-    """Give by how much a number differs from the one before; silent for the first.
+    """Send by how much a number differs from the one before; silent for the first.
 
     Attributes:
       value: a number.
       difference: this number minus the one before.
-      clear: forgets what was before.
+      clear: forgets the previous value.
 
     Raises:
       OverflowError: a whole number is too large for a float.
@@ -445,7 +445,7 @@ class Difference(Node):
 
     @slot
     def clear(self) -> None:
-        """Forget what was before."""
+        """Forget the previous value."""
         self.last = None
 
 
@@ -458,7 +458,7 @@ class Integral(_Timed):
     Attributes:
       value: a number.
       area: so far, in the unit of the value times seconds.
-      clear: begins anew at 0.
+      clear: starts over at 0.
 
     Raises:
       OverflowError: a whole number is too large for a float.
@@ -480,7 +480,7 @@ class Integral(_Timed):
 
     @slot
     def clear(self) -> None:
-        """Begin anew."""
+        """Start over."""
         self.stamp, self.total = None, 0.0
 
 

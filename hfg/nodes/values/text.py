@@ -1,7 +1,7 @@
 """Texts: joined, parted, replaced, searched, compared and made of values.
 
-What a format or a pattern is made of is a parameter, so of whoever builds the graph; a format still reaches no
-attribute and no item of a value, and makes no text that eats all memory. Stands on nodetype, functions and ports.
+Formats and patterns are parameters, so they come from the author of the graph; still, a format cannot access attributes
+or items of a value, or make a text that uses up all memory. Depends on nodetype, functions and ports.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ __all__ = [
 def join_text(*parts: object, separator: str) -> str:
     """Join the values at all inputs to one text.
 
-    Fires once all inputs hold a token. What is no text is written as `str` writes it.
+    Fires once all inputs hold a token. Anything else than text is written as by `str`.
 
     Args:
       parts: any number of values.
@@ -66,7 +66,7 @@ def join_list(items: Sequence[object], *, separator: str = ", ") -> str:
     """Join the items of a list to one text.
 
     Args:
-      items: what is no text is written as `str` writes it.
+      items: anything else than text is written as by `str`.
       separator: what stands between two of them.
     """
     return separator.join(map(str, items))
@@ -96,12 +96,12 @@ def split_lines(text: str) -> list[str]:
 
 @node
 def slice_text(text: str, *, start: int = 0, stop: int | None = None) -> str:
-    """Give a part of a text, as `text[start:stop]` does.
+    """Return a part of a text, as `text[start:stop]` does.
 
     Args:
       text: any text.
       start: the place of the first character, from 0; negative ones count from the end.
-      stop: the place behind the last character; None is the end.
+      stop: the index after the last character; None is the end.
     """
     return text[start:stop]
 
@@ -283,15 +283,14 @@ class Found(NamedTuple):
 
 @node(outputs=Found)
 def search_text(text: str, *, pattern: Annotated[str, Predicate(is_a_pattern)] = r"\S+") -> Found | None:
-    """Give the first place in a text that a regular expression describes; silent if there is none.
+    """Return the first place in a text that a regular expression describes; silent if there is none.
 
     Args:
       text: any text.
       pattern: of Python's `re`; one with nested repetitions may take very long.
 
     Returns:
-      found: what the pattern describes.
-      groups: what each of its groups describes; "" of a group that took no part.
+      found: what the pattern describes. groups: what each of its groups describes; "" of a group that took no part.
       names: the same by name, of groups that have names.
     """
     match = re.search(pattern, text)
@@ -300,7 +299,7 @@ def search_text(text: str, *, pattern: Annotated[str, Predicate(is_a_pattern)] =
 
 @node
 def find_all(text: str, *, pattern: Annotated[str, Predicate(is_a_pattern)] = r"\S+") -> list[str]:
-    """Give all places in a text that a regular expression describes, as they come.
+    """Return all places in a text that a regular expression describes, as they come.
 
     Args:
       text: any text.

@@ -1,4 +1,4 @@
-"""Calculating with vectors: lists of numbers and arrays with one axis. Stands on functions, ports and numpy."""
+"""Calculating with vectors: lists of numbers and arrays with one axis. Depends on functions, ports and numpy."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _array(values: Vector) -> VectorArray:
 
 @node
 def norm(vector: Vector, *, order: Literal["euclidean", "manhattan", "maximum"] = "euclidean") -> float:
-    """Give the length of a vector.
+    """Return the length of a vector.
 
     Args:
       vector: any number of numbers; an empty one has the length 0.
@@ -81,7 +81,7 @@ def scale_vector(vector: Vector, *, factor: Annotated[float, Unit("1")] = 1.0) -
 
 @node
 def normalize(vector: Vector) -> VectorArray | None:
-    """Give a vector of the same direction and length 1; silent for one without a direction.
+    """Return a vector of the same direction and length 1; silent for one without a direction.
 
     Args:
       vector: any number of numbers; one whose length is 0, infinite or NaN has no direction.
@@ -99,7 +99,7 @@ def normalize(vector: Vector) -> VectorArray | None:
 
 @node
 def dot(a: Vector, b: Vector) -> float:
-    """Give the scalar product of two vectors.
+    """Return the scalar product of two vectors.
 
     Args:
       a: the first vector.
@@ -117,7 +117,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 @node(inputs={"vectors": Inputs(Vector, 2)}, outputs=VectorArray)
 def add_vectors(*vectors: Any) -> VectorArray:
-    """Give the sum of the vectors at all inputs.
+    """Return the sum of the vectors at all inputs.
 
     Args:
       vectors: any number of vectors of one length.
@@ -149,7 +149,7 @@ class Extremum:
 
 @node(outputs=Extremum)
 def extremum(values: Vector, *, which: Literal["maximum", "minimum"] = "maximum") -> Extremum | None:
-    """Give the largest or smallest number of a vector and where it is; silent for an empty one.
+    """Return the largest or smallest number of a vector and where it is; silent for an empty one.
 
     Of equal ones it is the first. NaNs are passed over; if there is nothing else it is silent too.
 
@@ -158,8 +158,7 @@ def extremum(values: Vector, *, which: Literal["maximum", "minimum"] = "maximum"
       which: "maximum" or "minimum".
 
     Returns:
-      extremum: the number.
-      index: its place, from 0.
+      extremum: the number. index: its place, from 0.
 
     Raises:
       OverflowError: a whole number is too large for a float.
@@ -177,7 +176,7 @@ def extremum(values: Vector, *, which: Literal["maximum", "minimum"] = "maximum"
 def summarize(
     values: Vector, *, by: Literal["sum", "mean", "median", "std", "variance", "minimum", "maximum", "product"] = "mean"
 ) -> float | None:
-    """Give one number that stands for a vector; silent for an empty one.
+    """Return one number that stands for a vector; silent for an empty one.
 
     Args:
       values: any number of numbers.
@@ -203,7 +202,7 @@ class AddNoiseToVector(Node):
     Attributes:
       vector: any number of numbers.
       relative_sigma: the standard deviation of the noise, as a part of the number.
-      seed: begins another row of numbers; with None no two runs are alike.
+      seed: another seed gives other numbers; with None, every run has different ones.
       noisy: the vector with the noise.
 
     Raises:

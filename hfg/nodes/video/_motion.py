@@ -1,4 +1,4 @@
-"""What changes from picture to picture; each remembers what it has seen, and a reset makes it forget."""
+"""Changes from picture to picture; each node remembers earlier pictures, and a reset makes it forget them."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ Tracked = Annotated[npt.NDArray[np.float32], Rows(2), Named("Corners")]
 class BackgroundSubtractor(Node):
     """Find what moves in front of a background that is learned.
 
-    Fires once for each picture. The first pictures are all foreground or all background, depending on the method. A
-    picture of another size makes it begin anew.
+    Fires once per picture. The first pictures are all foreground or all background, depending on the method. A picture
+    of another size makes it start over.
 
     Attributes:
       method: "MOG2", a mixture of Gaussians for each pixel, or "KNN", the nearest of the last values.
@@ -43,7 +43,7 @@ class BackgroundSubtractor(Node):
       image: the picture, of any number of channels.
       mask: 255 where something moves, 127 for shadows, else 0.
       background: the background as it is known now; silence while nothing is known.
-      forget: learn the background anew.
+      forget: learn the background from scratch.
 
     Raises:
       TypeError: the picture is not of 8 bits.
@@ -84,14 +84,14 @@ class BackgroundSubtractor(Node):
 
     @slot
     def forget(self) -> None:
-        """Learn the background anew."""
+        """Learn the background from scratch."""
         self.made_of = None
 
 
 class FrameDifference(Node):
     """Find what changed since the last picture.
 
-    Fires once for each picture; the first one, and one of another size than the last, is silence.
+    Fires once per picture; the first one, and one of another size than the last, is silence.
 
     Attributes:
       threshold: by how much a pixel must have changed, 0 to 255.
@@ -123,15 +123,15 @@ class FrameDifference(Node):
 
 
 class RunningMean(Node):
-    """Give the mean of the pictures so far, in which older ones count less and less.
+    """Send the mean of the pictures so far, in which older ones count less and less.
 
-    Fires once for each picture; the first one, and one of another shape than the last, begins the mean.
+    Fires once per picture; the first one, and one of another shape than the last, begins the mean.
 
     Attributes:
       weight: how much the new picture counts, 0 to 1.
       image: the picture, of any number of channels.
       mean: the mean, of the same kind.
-      forget: begin anew with the next picture.
+      forget: starts over with the next picture.
 
     Raises:
       TypeError: the picture is not of 8 bits.
@@ -157,14 +157,14 @@ class RunningMean(Node):
 
     @slot
     def forget(self) -> None:
-        """Begin anew with the next picture."""
+        """Start over with the next picture."""
         self.total = None
 
 
 class OpticalFlow(Node):
     """Find how far each pixel moved since the last picture (dense inverse search).
 
-    Fires once for each picture; the first one, and one of another size than the last, is silence.
+    Fires once per picture; the first one, and one of another size than the last, is silence.
 
     Attributes:
       quality: "ultrafast", "fast" or "medium".
@@ -198,7 +198,7 @@ class OpticalFlow(Node):
 class PointTracker(Node):
     """Follow points from picture to picture (Lucas-Kanade).
 
-    Fires once for each picture. Points are looked for in the first picture and whenever fewer than `least` are left.
+    Fires once per picture. Points are looked for in the first picture and whenever fewer than `least` are left.
 
     Attributes:
       most: how many points are followed.
@@ -263,15 +263,15 @@ def _nothing() -> Any:
 class ObjectTracker(Node):
     """Follow an object from picture to picture (multiple instance learning).
 
-    Fires once for each picture; it is silent until `start` has said where the object is. Then the picture that comes
-    next is the one in which it is there.
+    Fires once per picture; it is silent until `start` has said where the object is. Then the picture that comes next is
+    the one in which it is there.
 
     Attributes:
       image: the picture: blue, green, red.
       box: where the object is: left, upper edge, width, height in pixels.
       start: left, upper edge, width, height of the object, in pixels.
       stop: follow nothing any more.
-      lost: the object is not found any more; it goes on looking.
+      lost: the object is not found any more; the search continues.
 
     Raises:
       TypeError: the picture is not of 8 bits.

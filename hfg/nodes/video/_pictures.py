@@ -32,7 +32,7 @@ def collage(
 ) -> Color:
     """Lay a picture over another one.
 
-    Fires once for each pair. What of the secondary picture lies outside of the main one is cut off.
+    Fires once per pair. Parts of the secondary picture outside the main one are cut off.
 
     Args:
       main: the picture below; gray, blue, green, red, or with opacity, which is left out.
@@ -92,7 +92,7 @@ class Screenshot(Node):
         image = _screen()
         folder = Path(self.path).absolute()
         if not folder.is_dir():
-            raise FileNotFoundError(f'there is no folder "{folder}" for the screenshot: make it, or mend path')
+            raise FileNotFoundError(f'there is no folder "{folder}" for the screenshot: make it, or correct path')
         number = 0
         while (target := folder / f"{self.name}{number}.{self.format}").exists():
             number += 1

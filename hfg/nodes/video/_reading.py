@@ -1,7 +1,7 @@
 """Sources that read video files and cameras.
 
-OpenCV blocks while it decodes and while it waits for a camera, so it works in a thread; whoever lets go of the capture
-waits for that thread, for OpenCV ends the process if a capture is released while it is read.
+OpenCV blocks while it decodes and while it waits for a camera, so it works in a thread. Releasing the capture waits for
+that thread, because OpenCV ends the process if a capture is released during a read.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class _Capture:
                 self._capture.set(what, value)
 
     def read(self) -> Any:
-        """Give the next picture, or None after the last one."""
+        """Return the next picture, or None after the last one."""
         with self._lock:
             if not self._open:
                 return None
@@ -94,15 +94,15 @@ class VideoFile(Node):
 
     A source. With rate "file" a picture leaves when its time has come since the first one left, as the file says; a
     consumer that is too slow delays it, and nothing is left out. With "fast" pictures leave as fast as they are taken.
-    The stamp of a picture is its time in the video, in seconds; each round of a loop goes on counting. After the last
-    picture the stream ends. A running node that is reset begins anew.
+    The stamp of a picture is its time in the video, in seconds; it keeps counting in each round of a loop. After the
+    last picture the stream ends. A running node that is reset starts over.
 
     Attributes:
       path: the file; anything that FFmpeg reads, or a pattern as in "pictures/%04d.png".
       rate: "file" or "fast".
       start: the number of the first picture, from 0.
       end_before: the number of the picture before which it stops; None for the whole video.
-      loop: begin again after the last picture, without end.
+      loop: start over after the last picture, endlessly.
       image: the picture: blue, green, red.
       number: the number of the picture in the file, from 0.
 
@@ -131,7 +131,7 @@ class VideoFile(Node):
         if not self.path:
             raise FileNotFoundError('no video is named: set path, as in VideoFile(path="people.avi")')
         if "%" not in self.path and not Path(self.path).is_file():
-            raise FileNotFoundError(f'there is no video "{self.path}": mend path, or put the file there')
+            raise FileNotFoundError(f'there is no video "{self.path}": correct path, or put the file there')
         self._open()
 
     def _open(self) -> None:
@@ -227,7 +227,7 @@ class Camera(Node):
             raise OSError(f"there is no camera {device}: cameras are counted from 0")
         capture = self.capture = _Capture(device)
         if not capture.is_open:
-            raise OSError(f"there is no camera {self.device!r}, or another program uses it: mend device")
+            raise OSError(f"there is no camera {self.device!r}, or another program uses it: correct device")
         wanted = (
             (cv2.CAP_PROP_FRAME_WIDTH, self.width),
             (cv2.CAP_PROP_FRAME_HEIGHT, self.height),

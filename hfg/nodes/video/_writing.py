@@ -30,13 +30,12 @@ _NARROWEST: Final = 8
 class WriteVideo(Node):
     """Write pictures into a video file.
 
-    The file is there as a whole or not at all: pictures go into a temporary file beside it, which takes its name when
-    the stream ends, the run is over or `finish` is called. What stood there before stays until then. Without a picture
-    nothing is written. After `finish` the next picture begins another video, which takes the place of the first unless
-    `path` was changed.
+    The file is complete or absent: pictures go into a temporary file next to it, which is renamed when the stream ends,
+    the run is over or `finish` is called. An existing file stays until then. Without a picture nothing is written.
+    After `finish` the next picture begins another video, which takes the place of the first unless `path` was changed.
 
     Attributes:
-      path: the file; directories that are missing are made.
+      path: the file; missing directories are created.
       codec: how pictures are packed: "MJPG" and "XVID" for .avi, "mp4v" for .mp4.
       fps: pictures per second that players show.
       width: in pixels; pictures are scaled to it. 0 takes that of the first picture.
@@ -48,7 +47,7 @@ class WriteVideo(Node):
 
     Raises:
       FileNotFoundError: no video is named.
-      OSError: the file cannot be written; the sentence says why.
+      OSError: the file cannot be written; the message says why.
       ValueError: a picture has another size than the first or is too narrow, or OpenCV does not write such a file.
 
     CS::APEX: csapex::MakeVideo.
@@ -168,7 +167,7 @@ class WriteVideo(Node):
             self.written.trigger(self._close())
 
     def teardown(self) -> None:
-        """Give what was written its name, also if the run failed elsewhere: every picture in it is whole."""
+        """Send the file its name, even if the run failed elsewhere: every picture in it is complete."""
         if self.writer is not None:
             self._close()
 
@@ -190,7 +189,7 @@ def _need_room(file: Path) -> None:
 
 
 def _need_complete(file: Path, count: int) -> None:
-    """See that a video holds so many pictures and its index, for OpenCV does not say what it could not write.
+    """Check that a video has `count` pictures and its index, because OpenCV does not report what it could not write.
 
     Raises:
       OSError: it does not.
@@ -210,7 +209,7 @@ def _need_complete(file: Path, count: int) -> None:
 
 
 def _room(file: Path) -> int:
-    """How many bytes the disk of a file has left for this user."""
+    """Return how many bytes the disk of a file has left for this user."""
     if not hasattr(os, "statvfs"):
         return _LEAST_BYTES
     disk = os.statvfs(file)
@@ -218,7 +217,7 @@ def _room(file: Path) -> int:
 
 
 def _umask() -> int:
-    """Give the rights that new files lack; a temporary file is for its owner alone."""
+    """Return the rights that new files lack; a temporary file is accessible only to its owner."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

@@ -92,7 +92,7 @@ class Calibration(msgspec.Struct, frozen=True):
 class CameraCalibration(Node):
     """Calibrate a camera by pictures of a chessboard.
 
-    Fires once for each picture and keeps the corners that it finds; `calibrate` computes what `calibrated` tells.
+    Fires once per picture and keeps the corners that it finds; `calibrate` computes what `calibrated` tells.
 
     Attributes:
       columns: inner corners of the board from left to right.

@@ -33,7 +33,7 @@ def _boxes(found: Any) -> list[Box]:
 class PeopleDetector(Node):
     """Find people who stand or walk, by histograms of gradients and OpenCV's own support vector machine.
 
-    Fires once for each picture. People are found from 128 pixels of height on; `scale_up` makes smaller ones larger.
+    Fires once per picture. People are found from 128 pixels of height on; `scale_up` makes smaller ones larger.
 
     Attributes:
       threshold: how sure it must be; higher finds fewer.
@@ -91,7 +91,7 @@ class PeopleDetector(Node):
 class CascadeDetector(Node):
     """Find objects by a cascade of classifiers (Viola and Jones): faces, eyes, bodies, or what a file describes.
 
-    Fires once for each picture.
+    Fires once per picture.
 
     Attributes:
       cascade: one of those that OpenCV ships, "frontalface_default", or the path of an .xml file.
@@ -104,7 +104,7 @@ class CascadeDetector(Node):
     Raises:
       FileNotFoundError: there is no such cascade.
       TypeError: the picture is not of 8 bits.
-      ValueError: the picture is empty or has two channels, or the file is no cascade.
+      ValueError: the picture is empty or has two channels, or the file is not a cascade.
 
     CS::APEX: csapex::VJDetector.
     """
@@ -140,7 +140,7 @@ class CascadeDetector(Node):
             self.detector = cascade_of(data)
         except ValueError as error:
             raise ValueError(
-                f'"{file}" is no cascade ({error}): it is an .xml file as opencv_traincascade writes it'
+                f'"{file}" is not a cascade ({error}): give an .xml file as opencv_traincascade writes it'
             ) from None
 
     def process(self, image: Picture) -> list[Box]:
@@ -153,7 +153,7 @@ class CascadeDetector(Node):
 class BarcodeReader(Node):
     """Read bar codes (EAN-8, EAN-13, UPC) and QR codes.
 
-    Fires once for each picture; one without a code gives empty lists. `read` tells each code when it is seen first, and
+    Fires once per picture; one without a code gives empty lists. `read` tells each code when it is seen first, and
     again when it was gone in between; with `republish` in every picture.
 
     Attributes:
@@ -225,7 +225,7 @@ def _codes(found: Any) -> list[tuple[str, Any]]:
 class MarkerDetector(Node):
     """Find ArUco and AprilTag markers.
 
-    Fires once for each picture; one without a marker gives empty lists.
+    Fires once per picture; one without a marker gives empty lists.
 
     Attributes:
       dictionary: which markers there are: "4X4_50", "5X5_100", "APRILTAG_36h11" ...
@@ -271,7 +271,7 @@ class MarkerDetector(Node):
 class ChessboardFinder(Node):
     """Find the inner corners of a chessboard, to a fraction of a pixel.
 
-    Fires once for each picture; one without a whole board is silence.
+    Fires once per picture; one without a whole board is silence.
 
     Attributes:
       columns: inner corners from left to right.
@@ -296,7 +296,7 @@ class ChessboardFinder(Node):
 
 
 def chessboard(image: Any, columns: int, rows: int) -> Any:
-    """Give the corners of a chessboard, or None."""
+    """Return the corners of a chessboard, or None."""
     picture = gray(image)
     try:
         found, corners = cv2.findChessboardCorners(picture, (columns, rows))

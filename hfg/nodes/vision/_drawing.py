@@ -1,4 +1,4 @@
-"""What was found, drawn for people to look at."""
+"""Draws results for people to look at."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def draw_boxes(
 ) -> Color:
     """Draw boxes around what was found, with words above them.
 
-    Fires once for each picture with its boxes, whether there are any or not. What lies beyond the picture is cut off.
+    Fires once per picture with its boxes, whether there are any or not. Parts beyond the picture are cut off.
 
     Args:
       image: the picture, which stays as it is: gray, or blue, green, red.

@@ -16,7 +16,7 @@ __all__ = ["EqualizeLocally"]
 class EqualizeLocally(Node):
     """Spread the brightness of each region over the whole range (CLAHE).
 
-    Fires once for each picture. Of a picture in colour the lightness is spread and the colours are kept.
+    Fires once per picture. Of a picture in colour the lightness is spread and the colours are kept.
 
     Attributes:
       limit: how far the contrast may be raised.

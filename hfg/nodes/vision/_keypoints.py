@@ -25,7 +25,7 @@ Places = Annotated[npt.NDArray[np.float32], Shape(None, 2), Named("Places")]
 class KeypointDetector(Node):
     """Find keypoints and describe them.
 
-    Fires once for each picture. A picture without keypoints gives empty ones.
+    Fires once per picture. A picture without keypoints gives empty ones.
 
     Attributes:
       method: how: ORB, AKAZE and BRISK describe by bits (uint8), SIFT and KAZE by real numbers (float32).
@@ -99,7 +99,7 @@ def match_descriptors(
 ) -> list[cv2.DMatch]:
     """Find which keypoints of two pictures belong together.
 
-    Fires once for each pair. A match is kept if the best is much nearer than the second best (Lowe's test).
+    Fires once per pair. A match is kept if the best is much nearer than the second best (Lowe's test).
 
     Args:
       first: descriptors of the first picture.

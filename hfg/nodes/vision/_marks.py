@@ -74,8 +74,8 @@ def find_bullseyes(
 ) -> list[Bullseye]:
     """Find bull's-eyes: dark and light rings around a middle, the outermost dark on light.
 
-    Fires once for each picture; one without a bull's-eye gives an empty list. A circle that is looked at from the side
-    is an ellipse, of which the longer axis says how far it is, and the shorter one how far from the side it is seen.
+    Fires once per picture; one without a bull's-eye gives an empty list. A circle that is looked at from the side is an
+    ellipse, of which the longer axis says how far it is, and the shorter one how far from the side it is seen.
 
     Args:
       image: the picture: gray, or in colour, which is made gray.
@@ -111,7 +111,7 @@ def find_quadrilaterals(
 ) -> list[Corners]:
     """Find the corners of dark quadrilaterals on light ground, such as the frames of signs.
 
-    Fires once for each picture; one without a quadrilateral gives an empty list.
+    Fires once per picture; one without a quadrilateral gives an empty list.
 
     Args:
       image: the picture: gray, or in colour, which is made gray.
@@ -119,7 +119,7 @@ def find_quadrilaterals(
 
     Returns:
       out: four corners each: upper left, upper right, lower right, lower left, in pixels; the largest first. They are
-        the outer corners of a frame.
+      the outer corners of a frame.
 
     Raises:
       TypeError: the picture is not of 8 bits.
@@ -156,7 +156,7 @@ def _checked(image: Any, name: str) -> Any:
 
 
 def _dark(picture: Any) -> Iterator[Any]:
-    """Give what is darker than its surroundings, for a small and a large neighbourhood."""
+    """Yield what is darker than its surroundings, for a small and a large neighbourhood."""
     smooth = cv2.GaussianBlur(picture, (3, 3), 0)  # else each grain of noise is a contour of its own
     for side in _NEAR_AND_FAR:
         yield cv2.adaptiveThreshold(smooth, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY_INV, side, _DARKER)
@@ -205,7 +205,10 @@ def _same_middle(inner: _Ellipse, outer: _Ellipse) -> bool:
 
 
 def _ellipse(contour: Any) -> _Ellipse | None:
-    """Fit an ellipse; None if the contour is none: also a square has the area of its ellipse, so radii are compared."""
+    """Fit an ellipse; None if the contour is not an ellipse.
+
+    A square can have the area of its ellipse, too, so radii are compared.
+    """
     if len(contour) < 8:
         return None
     fitted = _fit(contour.reshape(-1, 2))
@@ -230,7 +233,7 @@ def _fit(points: Any) -> _Ellipse | None:
 
 
 def _radii(points: Any, ellipse: _Ellipse) -> _Points:
-    """Give how far points are from the middle, where 1 is on the ellipse."""
+    """Return how far points are from the middle, where 1 is on the ellipse."""
     across, down = points[:, 0] - ellipse.x, points[:, 1] - ellipse.y
     cos, sin = np.cos(ellipse.angle), np.sin(ellipse.angle)
     first = (across * cos + down * sin) / (ellipse.major / 2)
@@ -284,7 +287,7 @@ def _borders(picture: Any, places: _Points, normals: _Points, reach: float) -> t
 
 
 def _quadrilateral(contour: Any) -> Any:
-    """Give the corners of a contour that has four of them and fills them, clockwise from the upper left, else None."""
+    """Return the corners of a contour that has and fills four of them, clockwise from the upper left, else None."""
     hull = cv2.convexHull(contour)
     rough = cv2.approxPolyDP(hull, 0.05 * cv2.arcLength(hull, closed=True), closed=True)
     if len(rough) != 4 or cv2.contourArea(contour) < 0.85 * cv2.contourArea(rough):
@@ -327,7 +330,7 @@ def _refined(picture: Any, corners: _Points) -> Any:
 
 
 def _line(points: _Points) -> tuple[float, float, float]:
-    """Give the line through points: its normal, and how far from the origin it is; points far off do not count."""
+    """Return the line through points: its normal, and how far from the origin it is; points far off do not count."""
     for _ in range(2):
         x, y = points.mean(0).tolist()
         across, down = points[:, 0] - x, points[:, 1] - y
