@@ -188,6 +188,7 @@ def test_files_of_the_project_that_pages_name_exist() -> None:
     assert not dead, "no such file: " + ", ".join(dead)
 
 
+@pytest.mark.slow
 def test_modules_and_names_that_are_named_exist() -> None:
     dead = [
         f"{prose.at(match)}: {match[1]}"
