@@ -199,6 +199,7 @@ def test_modules_and_names_that_are_named_exist() -> None:
     assert not dead, "no such module or name: " + ", ".join(dead)
 
 
+@pytest.mark.slow
 def test_a_module_imports_what_it_says_it_stands_on() -> None:
     dead = [
         f"{prose.at(match)}: {name}"

@@ -25,6 +25,7 @@ def run(command: list[str], folder: Path, *paths: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)  # pip, mypy and a few processes that import all
 def test_the_package_installs_is_found_and_passes_its_test(command: Command, tmp_path: Path) -> None:
     shown = command("new", "plugin", "MyLamps")
