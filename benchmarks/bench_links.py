@@ -85,7 +85,7 @@ def row(name: str, work: Work, letters: int, pictures: int, *, leaky: bool = Fal
 
 
 def job_for(work: Work, what: Literal["letter", "picture"], rate_hz: int, leaky: bool) -> Callable[[int], Any]:
-    """Give what does so many."""
+    """Return what does so many."""
     return lambda count: work(Job(what, count, rate_hz, leaky))
 
 

@@ -41,7 +41,7 @@ def letters(*, count: int = 10) -> Iterator[bytes]:
 
 @hfg.node
 def pictures(*, count: int = 10) -> Iterator[tuple[int, int, Picture]]:
-    """Give the picture again and again, with its number and the time."""
+    """Yield the picture again and again, with its number and the time."""
     for number in range(count):
         yield number, time.monotonic_ns(), picture()
 

@@ -115,7 +115,7 @@ def leaky(records: Records) -> str:
 
 
 def crossing(records: Records, kind: str) -> str:
-    """How many arrive a second, and how old they are when they come slowly: two columns for each size."""
+    """Return how many arrive a second, and how old they are when they come slowly: two columns for each size."""
     titles = {f"{size}, {what}": f"{size}: {title}" for size in SIZES for what, title in FIGURES.items()}
     named = {tuple(case.split(" | ")): record for case, record in records.items()}
     columns = [kind + column for column in titles if any(found == kind + column for _, found in named)]

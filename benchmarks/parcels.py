@@ -56,7 +56,7 @@ class Job(NamedTuple):
             yield number
 
     def wait_s(self, began: float, number: int) -> float:
-        """How long until this one's turn, for whoever may not; negative: it is late."""
+        """Return how long until this one's turn, for whoever may not; negative: it is late."""
         return began + number / self.rate_hz - time.monotonic() if self.rate_hz else -1.0
 
 
@@ -66,7 +66,7 @@ def letter(number: int) -> bytes:
 
 
 def opened(letter: Any) -> tuple[int, int]:
-    """Give the number of a letter, or of what is written like one, and when it was sent."""
+    """Return the number of a letter, or of what is written like one, and when it was sent."""
     return HEAD.unpack_from(letter)
 
 

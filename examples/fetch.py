@@ -20,7 +20,7 @@ import hfg
 
 @hfg.node
 def camera(*, cubes: Annotated[int, Ge(0)] = 8, empty: Annotated[int, Ge(0)] = 3) -> Iterator[str]:
-    """Give images: some of the empty floor, then one with a cube; at the end the floor stays empty."""
+    """Yield images: some of the empty floor, then one with a cube; at the end the floor stays empty."""
     for number in range(1, cubes + 1):
         yield from ["floor"] * empty
         yield f"cube {number}"

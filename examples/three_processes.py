@@ -27,7 +27,7 @@ cv2.setNumThreads(1)  # one core for each node, so that processes and not OpenCV
 
 @hfg.node
 def pictures(*, count: int = 8, width: int = 960, height: int = 720) -> Iterator[Gray]:
-    """Give pictures of spots that move, with noise that is the same each time."""
+    """Yield pictures of spots that move, with noise that is the same each time."""
     rows, columns = np.mgrid[0:height, 0:width]
     noise = np.random.default_rng(1).integers(0, 90, (height, width)).astype(np.float32)
     for number in range(count):

@@ -21,7 +21,7 @@ Activity moves."""
 
 @hfg.node
 def sentences(*, text: str = TEXT) -> Iterator[str]:
-    """Give one line after the other."""
+    """Yield one line after the other."""
     yield from text.splitlines()
 
 

@@ -27,7 +27,7 @@ LONGEST_S = 120
 
 
 def command() -> str | None:
-    """Give the runtime, which is a program of its own."""
+    """Return the runtime, which is a program of its own."""
     return shutil.which("dora", path=str(Path(sys.executable).parent)) or shutil.which("dora")
 
 

@@ -73,7 +73,7 @@ def ring(job: Job) -> dict[str, float]:
 
 
 def view_of(memory: SharedMemory) -> memoryview:
-    """Give its bytes."""
+    """Return its bytes."""
     assert memory.buf is not None
     return memory.buf
 

@@ -20,7 +20,7 @@ Place: TypeAlias = tuple[float, float]
 
 
 def destination(odometry: Odometry, x: float, y: float, turn: float) -> Pose:
-    """Give where a way leads from here, in the frame of the wheels.
+    """Return where a way leads from here, in the frame of the wheels.
 
     Args:
       odometry: what the wheels say.

@@ -105,7 +105,7 @@ def carry_out(
 
 
 def _processor_s() -> float:
-    """Give how long processors have worked for this process, and for those of its own that have ended."""
+    """Return how long processors have worked for this process, and for those of its own that have ended."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
 

@@ -47,7 +47,7 @@ def digit_sign(digit: int, size: int = 256) -> Picture:
 
 
 def ean8(digits: str) -> tuple[str, str]:
-    """Give the bars of seven digits as a text of 0 and 1, and the eight digits that a reader says.
+    """Return the bars of seven digits as a text of 0 and 1, and the eight digits that a reader says.
 
     Raises:
       ValueError: if these are not seven digits.
@@ -62,7 +62,7 @@ def ean8(digits: str) -> tuple[str, str]:
 
 
 def cube_code(station: int) -> str:
-    """Give the eight digits on the cubes for a station."""
+    """Return the eight digits on the cubes for a station."""
     return ean8(f"{station}" * 4 + "000")[1]
 
 

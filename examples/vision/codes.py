@@ -27,7 +27,7 @@ PARITIES: Final = "LLLLLL LLGLGG LLGGLG LLGGGL LGLLGG LGGLLG LGGGLL LGLGLG LGLGG
 
 
 def check_digit(twelve: str) -> str:
-    """Give the thirteenth digit: with it, the sum of all, those at even places three times, is a multiple of ten."""
+    """Return the thirteenth digit: with it, the sum of all, those at even places three times, is a multiple of ten."""
     return str(-sum(int(digit) * (1, 3)[place % 2] for place, digit in enumerate(twelve)) % 10)
 
 

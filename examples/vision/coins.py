@@ -30,7 +30,7 @@ Box = tuple[int, int, int, int]
 
 @hfg.node
 def photograph() -> Iterator[Gray]:
-    """Give the photograph of scikit-image."""
+    """Yield the photograph of scikit-image."""
     yield skimage.data.coins()  # type: ignore[no-untyped-call]
 
 

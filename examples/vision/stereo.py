@@ -38,7 +38,7 @@ class Pair(NamedTuple):
 
 @hfg.node(outputs=Pair)
 def motorcycle() -> Iterator[Pair]:
-    """Give the pair of scikit-image."""
+    """Yield the pair of scikit-image."""
     left, right, truth = skimage.data.stereo_motorcycle()  # type: ignore[no-untyped-call]
     truth[~np.isfinite(truth)] = np.nan
     yield Pair(cv2.cvtColor(left, cv2.COLOR_RGB2BGR), cv2.cvtColor(right, cv2.COLOR_RGB2BGR), truth)

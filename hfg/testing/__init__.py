@@ -3,20 +3,20 @@
     firing         fire one node without a graph
     values         Hypothesis: values of the type hints of ports and parameters
     samples        files of many kinds, for nodes that read some
-    trying         fire a node type with such values, and see whether it keeps its word
+    trying         fire a node type with such values, and check it against its declaration
     usable         the same for many types, in processes of their own
     diagrams       token diagrams: drive a node by lines of characters
     recording      a recorder for traces
     invariants     what holds in every run
     exploring      run a graph under many schedules, give the smallest that fails
-    strategies     Hypothesis: graphs, tokens, schedules      making, plans: what they stand on
+    strategies     Hypothesis: graphs, tokens, schedules      making, plans: their basis
     nodes          small deterministic node types
     reference      the oracle: the rules as a machine of permitted moves
     conformance    replay the trace of a run on the oracle
     transports     the tests that any transport passes
     pytest_plugin  fixtures and the `rule` mark
 
-Sees all of hfg; nothing of hfg sees it. What needs hypothesis is imported when it is used.
+Sees all of hfg; nothing of hfg sees it. Modules that need hypothesis are imported on first use.
 """
 
 from __future__ import annotations

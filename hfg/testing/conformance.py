@@ -1,10 +1,8 @@
 """Does a run do what the rules say? Its trace is replayed on the reference machine (rules T to X, F9, R5, R6).
 
-The trace's decisions (which node fires, which slot is called, when a waiting firing goes on, when time does) drive the
-machine; everything else in it must be
-exactly what the machine sees. Inside one decision the order is left open where the rules leave it open; nothing of one
-decision may be missing when the next
-one comes.
+The trace's decisions (which node fires, which slot is called, when a waiting firing resumes, when time advances) drive
+the machine; everything else in it must be exactly what the machine sees. Inside one decision the order is left open
+where the rules leave it open; nothing of one decision may be missing when the next one comes.
 """
 
 from __future__ import annotations
@@ -216,7 +214,7 @@ class Replay:
         """Check that nothing is missing and that nothing more could move before something comes from outside.
 
         Args:
-          time: what the clock of the run says; it may have gone on without anything to see.
+          time: time on the run's clock; it may have advanced without visible events.
 
         Raises:
           Divergence: the run has stopped too early.
@@ -252,7 +250,7 @@ class Replay:
         self._unheard.update(map(key, idle))
 
     def _keep_up(self, event: EventTriggered) -> None:
-        """Bring code that triggers for nobody as far as in the run: an edit may change what it does next (R4)."""
+        """Advance code whose triggers have no receiver as far as in the run: an edit may change its next steps (R4)."""
         if event.time > self.machine.now + _SAME_TIME:
             self._let_time_go(event)
         node, wanted = self._teller(event), key(event)
@@ -261,11 +259,11 @@ class Replay:
         self._unheard[wanted] -= 1
 
     def _steps_of(self, node: str | None) -> list[Move]:
-        """What waiting code of a node may do next."""
+        """Return the next possible steps of a node's waiting code."""
         return [move for move in self.machine.moves() if move.kind in _STEPS and move.node == node]
 
     def _is_idle(self, event: TraceEvent) -> bool:
-        """Return whether nobody could tell: events without edges, and what is not compared."""
+        """Return whether the event is invisible: events without edges, and events that are not compared."""
         if isinstance(event, EventTriggered):
             return event.event not in self._connected
         if isinstance(event, TokenProcessed):  # a delay or buffer: nobody waits, so nobody is told when
@@ -316,7 +314,7 @@ class Replay:
         raise Divergence("the run moved when the rules forbid it", event, self)
 
     def _end_rest(self, node: str) -> None:
-        """Nobody sees a restarted node come back, but that it goes on."""
+        """A restarted node becomes visible only when it continues."""
         for move in self.machine.moves():
             if move.kind == "timer" and move.node == node and not self.machine.times_out(self.machine.paths[node]):
                 self._apply(move)
@@ -358,7 +356,7 @@ class Replay:
             raise Divergence(f"the run {why}", event, self)
 
     def _explaining(self, event: TraceEvent) -> Move | None:
-        """The move that may lie behind an event: a step of its node, or one of those that follow from quiet."""
+        """Return the move that may explain an event: a step of its node, or one that follows from quiet."""
         moves = self.machine.moves()
         node = self._teller(event)
         ringing = next((move for move in moves if self._rings(move, event)), None)
@@ -391,7 +389,7 @@ class Replay:
         return False
 
     def _follows_from_quiet(self, move: Move, event: TraceEvent) -> bool:
-        """Return whether a step that follows from quiet alone may lie behind the event."""
+        """Return whether a step that follows only from quiet may explain the event."""
         match move.kind:
             case "grow":
                 return isinstance(event, QueueGrown) and move.edge == event.edge
@@ -414,9 +412,9 @@ class Replay:
         return move.kind == "task" or self._resets(move) or (move.kind == "go on" and isinstance(event, QueueGrown))
 
     def _strangeness(self, move: Move, event: TraceEvent) -> tuple[bool, bool, bool]:
-        """Of several firings of one node (F14) the step of which is least likely to be behind the event.
+        """Rank the firings of one node (F14): the higher, the less likely its step explains the event.
 
-        Signals have the stamp of their firing (T5); what is told of the end of one names it. The code of a run begins
+        Signals have the stamp of their firing (T5); events about the end of a firing name it. The code of a run begins
         with its firing, so a first step comes before the next of those that have waited. A task triggers and fails, and
         does nothing else that could be seen.
         """
@@ -468,7 +466,7 @@ class Replay:
             self._apply(steps[0])
 
     def _reaches(self, name: str) -> bool:
-        """Return whether somebody would see what is fed."""
+        """Return whether anything would observe the tokens that are fed."""
         return any(self.machine.is_live(line) for line in self.machine.lines_from(-1, "output", name))
 
     def _let_time_go(self, event: TraceEvent) -> None:
@@ -500,7 +498,7 @@ class Replay:
 
 
 def key(event: TraceEvent) -> tuple[Any, ...]:
-    """What of an event is compared; its time is compared apart."""
+    """Return the part of an event that is compared; its time is compared separately."""
     kind = type(event).__name__
     if isinstance(event, TokenSent | TokenTaken | TokenDrained):
         return (kind, event.edge, token_key(event.token))
@@ -533,7 +531,7 @@ def value_key(value: Any) -> Any:
 
 
 def _without_place(value: object) -> str:
-    """What it looks like, but for where it lies in memory."""
+    """Return its repr without addresses in memory."""
     return _PLACE.sub("", shown(value, _LONGEST))
 
 

@@ -8,8 +8,8 @@
     + ~      a signal without a value that carries +1 or -1
     (3+4)    several in one tick; after + or ~ the next value carries +1 or -1, and +! is a signal that does
 
-Spaces are left out, so lines can be put below each other. `run` drives a node with such lines in virtual time and gives
-back such lines:
+Spaces are left out, so lines can be put below each other. `run` drives a node with such lines in virtual time and
+returns such lines:
 
     >>> import hfg
     >>> @hfg.node
@@ -143,7 +143,7 @@ def _letters(step: Step, letters: list[tuple[Any, str]]) -> str:
 
 
 class _Driver(hfg.Node):
-    """Gives what a diagram says, when it says so; waits for ever behind a line without an end."""
+    """Gives what a diagram says, when it says so; waits forever after a line without an end."""
 
     out = hfg.Output(Any)
     signal = hfg.Event(Any)
@@ -200,7 +200,7 @@ def run(
       lines: by input or slot.
 
     Raises:
-      ValueError: a name is no input and no slot.
+      ValueError: a name is neither an input nor a slot.
     """
     if not isinstance(node, Node):
         raise UsageError(f'a diagram drives a node, got {node!r:.80}: write run(double(), value="1-2")')

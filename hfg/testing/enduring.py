@@ -58,7 +58,7 @@ class Death(msgspec.Struct, frozen=True):
 
 
 class Endured(msgspec.Struct, frozen=True):
-    """What became of a type.
+    """The result for a type.
 
     Attributes:
       calls: how many were made.
@@ -271,7 +271,7 @@ class _Calls:
         self._node: Any = None
 
     def _drawn(self, number: int) -> tuple[dict[str, Any], Hostile]:
-        """Draw the parameters, which belong to a row of calls, and return what draws the values."""
+        """Draw the parameters, which are shared by several calls, and return the generator of values."""
         row = Hostile(f"{self._reference} {self._seed} row {number // _IN_A_ROW}", guards=False)
         given = {name: spec for name, spec in self._type.parameters.items() if spec.is_given}
         parameters = {

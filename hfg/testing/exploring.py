@@ -249,6 +249,6 @@ def _default_result(graph: Graph) -> Callable[[Recorder], Any]:
 
 
 def _needed(trace: Recorder, label: str) -> list[tuple[str, int]]:
-    """What somebody had a use for: where a source is given up that sends to ended nodes alone, F7 leaves open (R5)."""
+    """Return the tokens that had a use: F7 leaves open where a source that sends only to ended nodes stops (R5)."""
     drained = {event.token.sequence for event in trace.of(TokenDrained) if event.edge == label}
     return [(repr(t.value), t.activity) for t in trace.tokens(label) if t.sequence not in drained]

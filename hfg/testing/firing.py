@@ -50,7 +50,7 @@ class Firing:
       events: signals in order, as (event, value).
       sent: both with their modifiers and stamps, events first.
       ended: the source has nothing more to give.
-      answer: what a hook gave back, as `ready` does.
+      answer: the result of a hook, such as `ready` does.
     """
 
     outputs: dict[str, Any]
@@ -187,7 +187,7 @@ def _need_one(node: Node, slot: str | None, hook: str | None, values: dict[str, 
 
 @contextmanager
 def _placed(node: Node) -> Iterator[None]:
-    """Give a node that is in no graph a place of its own meanwhile, so that its code may ask for its path."""
+    """Provide a place for a node that is not in a graph, so that its code can use its path."""
     if node._place is not None:
         yield
         return

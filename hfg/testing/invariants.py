@@ -1,4 +1,4 @@
-"""What holds in every run of every graph, as functions over its trace; each says what is wrong, or gives an empty list.
+"""Invariants of every run of every graph, as functions over its trace; each returns a list of violations.
 
 They need no oracle, so they can be asked of a user's own graph: `explore(build, invariants=[no_token_lost, ...])`.
 """
@@ -176,7 +176,7 @@ def as_many_firings_as_allowed(concurrency: Mapping[str, int]) -> Invariant:
     Their calls wait for no firing, but for each other, and no firing begins during a call.
 
     Args:
-      concurrency: how many firings of a node may be under way at once, by its path; 1 for all others.
+      concurrency: how many firings of a node may be in progress at once, by its path; 1 for all others.
     """
     several = dict(concurrency)
 
@@ -210,7 +210,7 @@ def _overlaps(events: list[TraceEvent], concurrency: Mapping[str, int]) -> list[
 
 
 def ended_nodes_rest(events: list[TraceEvent]) -> list[str]:
-    """A node that has ended fires no more, unless it is set up afresh (F12)."""
+    """A node that has ended fires no more, unless it is set up again (F12)."""
     ended: set[str] = set()
     busy: set[str] = set()
     afresh: set[str] = set()  # as soon as what they are amid is over, for a subgraph around them was meant
@@ -233,7 +233,7 @@ def ended_nodes_rest(events: list[TraceEvent]) -> list[str]:
 
 
 def time_never_goes_back(events: list[TraceEvent]) -> list[str]:
-    """Time stands or goes on (R6)."""
+    """Time stands still or advances (R6)."""
     return [
         f"{type(later).__name__} at {later.time} after {earlier.time}"
         for earlier, later in pairwise(events)
@@ -277,7 +277,7 @@ def broken(events: list[TraceEvent], invariants: Iterable[Invariant] = ALL) -> l
     """Ask all of them; give every sentence that says what is wrong. One that raises says so, too.
 
     Raises:
-      UsageError: an invariant gave back something else.
+      UsageError: an invariant returned something else.
     """
     return [f"{_title(invariant)}: {sentence}" for invariant in invariants for sentence in _asked(invariant, events)]
 
@@ -304,7 +304,7 @@ def _asked(invariant: Invariant, events: list[TraceEvent]) -> list[str]:
 
 
 def _raised(error: Exception) -> str:
-    """What it raised, and where, for an `assert` often has no words."""
+    """Return what it raised, and where, because an `assert` often has no message."""
     frames = traceback.extract_tb(error.__traceback__)
     last = frames[-1]
     return f"{in_words(error)} ({Path(last.filename).name}, line {last.lineno}: {last.line})"

@@ -1,4 +1,4 @@
-"""Making random plans: one procedure for everybody who can choose.
+"""Making random plans: one procedure for every kind of chooser.
 
 Hypothesis chooses so that it can shrink; a seeded generator chooses fast.
 """
@@ -70,7 +70,7 @@ class SeededChooser:
 
 @dataclass(frozen=True)
 class Allowed:
-    """What may occur in a plan; a test of one rule leaves out what has nothing to do with it."""
+    """Features that may occur in a plan; a test of one rule omits unrelated ones."""
 
     max_nodes: int = 7
     events: bool = True
@@ -279,7 +279,7 @@ class _Making:
                 self.nodes.append(NodePlan(f"n{number}behind", _BEHIND[kind]))
 
     def make_rings(self) -> None:
-        """Requests that come back as answers into a slot, and beside them what lives on, whatever becomes of them."""
+        """Requests that come back as answers into a slot, and alongside them nodes that keep running."""
         choose = self.choose
         for number in range(choose.number(1, 2)):
             gate, worker = f"gate{number}", f"worker{number}"
@@ -317,7 +317,7 @@ class _Making:
         return kinds
 
     def _seldom(self, percent: int) -> int:
-        """What keeps a node out of a region, or splits one, is to be rare where regions are wanted."""
+        """Features that keep a node out of a region, or split one, should be rare where regions are wanted."""
         return percent // 3 if self.allowed.plain else percent
 
     def _parameters(self, kind: str) -> dict[str, Any]:
@@ -399,7 +399,7 @@ class _Making:
         return options
 
     def _trying_again(self, kind: str) -> dict[str, Any]:
-        """How often, and when, a firing that has failed is tried again; what follows behind the last attempt (X1)."""
+        """How often, and when, a firing that has failed is tried again; what follows after the last attempt (X1)."""
         choose = self.choose
         options: dict[str, Any] = {"retries": choose.number(1, 4), "retry_backoff_s": choose.one_of([0.004, 0.0, 0.02])}
         if choose.chance(30):
@@ -418,7 +418,7 @@ class _Making:
         return description(plan.type)
 
     def outputs(self, nodes: Sequence[NodePlan]) -> list[End]:
-        """Outputs that anybody may be connected to."""
+        """Return outputs that any node may be connected to."""
         return [
             (node.name, "output", port)
             for node in nodes
@@ -438,7 +438,7 @@ class _Making:
         return own + (self._sent(nodes) if self.choose.chance(self._seldom(40)) else [])
 
     def _sent(self, nodes: Sequence[NodePlan]) -> list[End]:
-        """The events beside outputs; a subgraph has none."""
+        """Return the `sent` events of outputs; a subgraph has none."""
         return [
             (node, "event", sent_name(port))
             for node, _, port in self.outputs(nodes)
@@ -600,7 +600,7 @@ class _Making:
     # --- the rest
 
     def make_concurrent(self) -> None:
-        """Let some async nodes have several firings under way; those with active edges may not (F14)."""
+        """Let some async nodes have several firings in progress; those with active edges may not (F14)."""
         choose = self.choose
         carrying = {end[0] for edge in self.edges if edge.options.get("active") for end in (edge.source, edge.target)}
         for index, node in enumerate(self.nodes):

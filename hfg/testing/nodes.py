@@ -1,6 +1,6 @@
 """Node types for tests: small, deterministic, found by name, and with every kind of port between them.
 
-What they do depends on what they are given alone, never on time or chance, so that a run of the engine and one of the
+Their behaviour depends only on their inputs, never on time or chance, so that a run of the engine and one of the
 reference can be compared.
 """
 
@@ -194,7 +194,7 @@ def handing(value: int) -> Any:
 
 @hfg.node(outputs=Any)
 def odd(value: Any, *, what: str = "0-d array", every: int = 2) -> Any:
-    """Return a value now and then that nobody can look at."""
+    """Return a value now and then that cannot be inspected."""
     return STRANGE[what]() if isinstance(value, int) and value % every == 0 else value
 
 
@@ -227,7 +227,7 @@ def calling(value: int) -> Any:
 
 
 class Sends(hfg.Node):
-    """Sends by itself, gives back, or keeps silent."""
+    """Sends, returns, or keeps silent."""
 
     value = hfg.Input(int)
     out = hfg.Output(int)
@@ -242,7 +242,7 @@ class Sends(hfg.Node):
 
 
 def _say(port: OutputPort[int], way: str, value: int) -> int | None:
-    """Answer by an output in one of the ways there are; what is given back is to be returned."""
+    """Answer by an output in one of the ways there are; the caller must return the result."""
     match way:
         case "return":
             return value
@@ -290,12 +290,12 @@ class Speaks(hfg.Node):
     way = hfg.Parameter("send")
 
     def process(self, value: int) -> int | None:
-        """Leave it to a function beside."""
+        """Delegate to a helper function."""
         return _say(self.out, self.way, value)
 
 
 class SpeaksLater(hfg.Node):
-    """The same from async code, before or behind a pause; or by a task of its own."""
+    """The same from async code, before or after a pause; or in a task of its own."""
 
     value = hfg.Input(int)
     out = hfg.Output(int)
@@ -304,7 +304,7 @@ class SpeaksLater(hfg.Node):
     by_task = hfg.Parameter(False)
 
     async def process(self, value: int) -> int | None:
-        """Leave it to a function beside."""
+        """Delegate to a helper function."""
         if self.by_task:
             task = asyncio.create_task(self.answer(value))
             await _pause(self.pause, value)
@@ -419,7 +419,7 @@ class Lends(hfg.Node):
 
 
 class LendsLater(hfg.Node):
-    """The same from async code: it borrows before a pause and sends behind it."""
+    """The same from async code: it borrows before a pause and sends after it."""
 
     value = hfg.Input(int)
     out = hfg.Output(NDArray[np.int64])
@@ -493,7 +493,7 @@ class Script(hfg.Node):
     at = hfg.State(0)
 
     def process(self) -> None:
-        """Give the next number."""
+        """Send the next number."""
         if self.at >= self.count:
             raise hfg.EndOfStream
         self.at += 1
@@ -534,7 +534,7 @@ class Passing(hfg.Node):
 
 
 class PassingLater(hfg.Node):
-    """Passes tokens on, behind a pause, or again with the next."""
+    """Passes tokens on, after a pause, or again with the next."""
 
     value = hfg.Input(int)
     out = hfg.Output(int)
@@ -601,7 +601,7 @@ class Counter(hfg.Node):
         self.total = value
 
     def end(self) -> None:
-        """Say the last word on both ways."""
+        """Send the last tokens both ways."""
         self.out.send(-self.total)
         self.told.trigger(-self.total)
 
@@ -694,7 +694,7 @@ class Greeter(hfg.Node):
     every = hfg.Parameter(2)
 
     def process(self, value: int) -> None:
-        """Give explicit modifiers in turn."""
+        """Send explicit modifiers in turn."""
         turn = value % (self.every + 1)
         if turn == 0:
             self.sign.trigger(value, activity=1)
@@ -785,7 +785,7 @@ class OnlyTwice(hfg.Node):
 
 
 class Waiting(hfg.Node):
-    """Waits amid a firing and triggers before and after."""
+    """Waits during a firing and triggers before and after."""
 
     value = hfg.Input(int)
     out = hfg.Output(int)
@@ -812,7 +812,7 @@ Turn = Annotated[NDArray[np.float64], Shape(2, 2)]
 
 
 class Tuned(hfg.Node):
-    """Has a parameter of every kind that is no plain number or text, and adds up what they say."""
+    """Has a parameter of every kind that is not a plain number or text, and adds up their values."""
 
     value = hfg.Input(int)
     out = hfg.Output(int)
@@ -859,7 +859,7 @@ class Unsteady(hfg.Node):
     pause_s = hfg.Parameter(0.003)
 
     def setup(self) -> None:
-        """Nothing was tried so far: tokens are told apart by stamp and number, values may come again."""
+        """Nothing was tried so far: tokens are distinguished by stamp and number, values may come again."""
         self.tries: dict[tuple[float, int, int], int] = {}
 
     async def process(self, value: hfg.Token[int]) -> int:
@@ -878,8 +878,8 @@ class Unsteady(hfg.Node):
 class Stubborn(hfg.Node):
     """Fails as often for a token as its value says, without waiting.
 
-    What it counts it knows through all its lives: with a `setup()` to forget it, which takes its time in a thread, the
-    reset of a subgraph would be no single moment.
+    Its counts survive resets: with a `setup()` to forget it, which takes its time in a thread, the reset of a subgraph
+    would not be a single moment.
     """
 
     value = hfg.Input(int)
@@ -951,7 +951,7 @@ class Doubter(hfg.Node):
 
 
 class LastWord(hfg.Node):
-    """Keeps its activity until its end, and says its last word against it."""
+    """Keeps its activity until its end, and sends its last tokens against it."""
 
     value = hfg.Input(int)
     out = hfg.Output(int)
@@ -1143,14 +1143,14 @@ class Gate(hfg.Node):
 
 
 class Watch(hfg.Node):
-    """Lives beside everything else: a task that speaks to nobody in particular, for longer than most."""
+    """Runs alongside everything else: a task whose signals have no particular receiver, for longer than most."""
 
     tick = hfg.Event(int)
     period_s = hfg.Parameter(0.02)
     count = hfg.Parameter(6)
 
     def setup(self) -> None:
-        """Begin; nobody sees when the task does, so the parameters are read here, before any edit."""
+        """Start; the start of the task is invisible, so the parameters are read here, before any edit."""
         self.start_soon(self.ticks(self.count, self.period_s))
 
     async def ticks(self, count: int, period_s: float) -> None:

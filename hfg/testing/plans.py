@@ -58,7 +58,7 @@ class GatePlan:
 
 @dataclass(frozen=True)
 class GraphPlan:
-    """A graph; `build()` makes it afresh, `repr` is the program that does."""
+    """A graph; `build()` makes a new one, `repr` is the program that does."""
 
     nodes: tuple[NodePlan, ...]
     edges: tuple[EdgePlan, ...]
@@ -78,7 +78,7 @@ class GraphPlan:
         _Building(self, graph, border)
 
     def flat(self) -> GraphPlan:
-        """The same without boxes, and without what is said about them."""
+        """The same without boxes, and without declarations about them."""
         boxes = {box.name for box in self.boxes}
         return replace(
             self,

@@ -53,9 +53,9 @@ def virtual_time() -> Callable[[Coroutine[Any, Any, T]], T]:
 
 @pytest.fixture
 def run_graph() -> Callable[..., Ran]:
-    """Return a function that runs a graph in virtual time, with the arguments of `hfg.run`; errors are told.
+    """Return a function that runs a graph in virtual time, with the arguments of `hfg.run`; errors are reported.
 
-    In debug mode, unless it is said otherwise: values fit the types of their ports, and shared ones are not changed.
+    In debug mode, unless set otherwise: values match the types of their ports, and shared ones are not changed.
     """
 
     def run(graph: Graph, *, debug: bool = True, **options: Any) -> Ran:

@@ -1,6 +1,6 @@
 """Small files that paths are drawn from, and a folder of their own for nodes that read and write some.
 
-Stands on numpy and on runs, which make the recording among them.
+Depends on numpy and on runs, which make the recording among them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""Values that nobody can look at without harm: they raise when compared, counted, printed, hashed or asked for a class.
+"""Values that cannot be inspected without harm: they raise when compared, printed, hashed or asked for a class.
 
-What a run does with a value of its nodes must not depend on what the value does. `STRANGE` makes each by its name,
-afresh.
+The behaviour of a run must not depend on the behaviour of its values. `STRANGE` makes a new one of each, by name.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Hypothesis strategies: tokens, graphs, schedules.
 
-What fails is shrunk to a small graph whose `repr` is the program that builds it.
+Failing graphs are shrunk to a small graph whose `repr` is the program that builds it.
 
 Examples:
   >>> from hypothesis import given
@@ -46,7 +46,7 @@ def _plans(draw: st.DrawFn, allowed: Allowed | None) -> GraphPlan:
 
 
 def graphs(allowed: Allowed | None = None) -> st.SearchStrategy[GraphPlan]:
-    """Return plans of graphs: call one to build its graph, afresh each time.
+    """Return plans of graphs: call one to build a new graph each time.
 
     Args:
       allowed: what may occur; `SYNCHRONOUS` is what rule F7 speaks of.

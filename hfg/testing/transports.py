@@ -75,11 +75,11 @@ def _plain(message: Message) -> tuple[bytes, bytes]:
 
 
 class TransportTests:
-    """What a transport has to do, as tests.
+    """The requirements on a transport, as tests.
 
     Attributes:
       patience_s: how long a test waits for what must come.
-      lease_s: how long it may take until somebody who has died is told as gone.
+      lease_s: how long it may take until a dead program is reported as gone.
       large: bytes of a large datagram that must go.
       factory: makes the event loop; None: asyncio's.
     """
@@ -90,7 +90,7 @@ class TransportTests:
     factory: Callable[[], asyncio.AbstractEventLoop] | None = None
 
     def sessions(self, count: int) -> AbstractAsyncContextManager[list[Any]]:
-        """Open so many sessions that hear each other, and close them at the end."""
+        """Open `count` sessions that can reach each other, and close them at the end."""
         raise NotImplementedError("a class of transport tests says in `sessions` how sessions are opened")
 
     def disturb(self, sessions: list[Any]) -> bool:
@@ -107,7 +107,7 @@ class TransportTests:
         return False
 
     def run(self, scenario: Callable[[list[Any]], Coroutine[Any, Any, None]], count: int = 2) -> None:
-        """Run a test with so many sessions."""
+        """Run a test with `count` sessions."""
 
         async def main() -> None:
             async with self.sessions(count) as sessions:
@@ -121,7 +121,7 @@ class TransportTests:
         return Collected(self.patience_s)
 
     async def reach(self, publisher: Publisher, *inboxes: Collected[Message], header: bytes = b"hello") -> None:
-        """Put until it arrives everywhere: that somebody has subscribed needs a moment to be known."""
+        """Put until it arrives everywhere: it takes a moment until subscribers are known."""
 
         def has_come(got: list[Message]) -> bool:
             return any(bytes(one[0]) == header for one in got)
@@ -218,7 +218,7 @@ class TransportTests:
         self.run(scenario)
 
     def test_a_callback_that_raises_stops_nothing(self) -> None:
-        """The session counts it and goes on."""
+        """The session counts it and continues."""
 
         async def scenario(sessions: list[Session]) -> None:
             inbox = self.collected()
@@ -319,7 +319,7 @@ class TransportTests:
         self.run(scenario)
 
     def test_a_name_is_announced_once_by_a_session(self) -> None:
-        """A second time is a mistake; another session may, and both are told."""
+        """A second time is a mistake; another session may, and both are reported."""
 
         async def scenario(sessions: list[Session]) -> None:
             sessions[0].announce("twice")
@@ -363,7 +363,7 @@ class TransportTests:
     # --- questions
 
     def test_a_question_is_answered_or_refused(self) -> None:
-        """The sentence of what the handler raises goes to who has asked."""
+        """The message of the handler's exception is sent to the caller."""
 
         async def scenario(sessions: list[Session]) -> None:
             async def answer(question: bytes) -> bytes:
@@ -510,7 +510,7 @@ class TransportTests:
         self.run(scenario)
 
     def test_an_exact_link_holds_its_producer_back(self) -> None:
-        """Rules L1 and L3: a window, and nobody on the other side."""
+        """Rules L1 and L3: a window, without a consumer."""
 
         async def scenario(sessions: list[Session]) -> None:
             sender = self._sender(sessions[0], "link/held", window=4)
@@ -626,7 +626,7 @@ class TransportTests:
         await receiver.close()
 
     async def ask(self, session: Session, name: str, question: bytes) -> bytes:
-        """Ask until somebody answers: that somebody does needs a moment to be known."""
+        """Ask until there is an answer: it takes a moment until the answerer is known."""
         for _ in range(100):
             try:
                 return await session.ask(name, question, timeout_s=self.patience_s)

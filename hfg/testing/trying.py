@@ -2,7 +2,7 @@
 
 Outputs and events must be of their declared types, and a firing may raise only what the docstring has under `Raises:`.
 Sources are fired as sources, async code waits in virtual time, what lives by slots is called by them, subgraphs run in
-a little graph. Stands on `values`, `firing` and the catalogue; needs hypothesis. `usable` does it for many types.
+a little graph. Depends on `values`, `firing` and the catalogue; needs hypothesis. `usable` does it for many types.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class NotUsable(AssertionError):
 
 
 class Trial(msgspec.Struct, frozen=True):
-    """What became of a type that was tried.
+    """The result of trying a type.
 
     Attributes:
       fired: how many firings and calls went well.
@@ -341,7 +341,7 @@ class _Trying:
 
 
 class _Given(Node):
-    """Gives the values one by one."""
+    """Sends the values one by one."""
 
     out = hfg.Output(Any)
     values = hfg.Parameter([], type=Any)
@@ -351,7 +351,7 @@ class _Given(Node):
 
 
 class _Waits(Exception):
-    """The firing waits for what never comes when the node is alone."""
+    """The firing waits for something that cannot happen without a graph."""
 
 
 def _fired(node: Node, values: dict[str, Any], how: Mapping[str, Any]) -> Firing:
@@ -370,7 +370,7 @@ def _chosen(data: st.DataObject, kind: NodeType) -> list[str]:
 
 
 def _outlet(kind: str, name: str) -> str:
-    """Name the output of the graph by which a port is heard; "values[0]" would be no name."""
+    """Name the output of the graph by which a port is heard; "values[0]" is not a valid name."""
     return f"{kind}_{name.replace('[', '_').rstrip(']')}"
 
 

@@ -1,8 +1,8 @@
 """Tries many node types, in processes of their own: `python -m hfg.testing.usable [MODULE or REFERENCE ...]`.
 
 A type that ends its process, or never comes back, is named and the others go on in a new one. Memory is bounded, the
-heap is checked where the C library can, there is no standard input, and what the nodes print goes nowhere.
-Stands on `trying` and the catalogue.
+heap is checked where the C library can, there is no standard input, and what the nodes print goes nowhere. Depends on
+`trying` and the catalogue.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def try_all(
       seed: as for `try_type`.
       limit_s: of processor time for one type, and four times as long by the clock, for one that waits; a type that
         takes longer is stopped and named.
-      confirm: a type that ended its process, or was stopped, is tried alone once more. If it is well then, so it is
+      confirm: a type that ended its process, or was stopped, is tried once more by itself. If it is well then, so it is
         called if it was stopped; if it had ended its process, those before it are tried alone too, to find who did the
         harm.
       processes: how many at once; each has its share of the types.
@@ -99,7 +99,10 @@ def _dead(reference: str, died: str) -> Trial:
 
 
 def _confirmed(reference: str, died: str, before: Sequence[str], how: _How) -> Trial:
-    """Try alone what has died, and if it lives then those before it: what one does to the heap ends another."""
+    """Retry a type that died by itself; if it survives, retry those before it, too.
+
+    The effect of one type on the heap may end another.
+    """
     alone, again = _process([reference], how)
     if again:
         return _dead(reference, again)

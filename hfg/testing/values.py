@@ -1,7 +1,7 @@
 """Hypothesis strategies for the values of a type hint, as ports and parameters declare them.
 
 Type hints of Python, limits of annotated-types, arrays and images of `hfg.types` and `hfg.images`, records. Numbers are
-mostly small and never beyond a million, arrays have a few dozen pixels: what breaks a node is seldom the size. Needs
+mostly small and never beyond a million, arrays have a few dozen pixels: size is rarely what breaks a node. Needs
 hypothesis; knows no nodes.
 """
 
@@ -46,7 +46,7 @@ _LETTERS: Final = "aB1 .,:;-+_/\\'\"{}[]()%$\n\t\0\x7f\u00e9\u00df\u6f22\U0001f6
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Alike:
-    """What arrays that are drawn for one firing have in common, so that functions of two images often get a pair.
+    """The common properties of arrays that are drawn for one firing, so that functions of two images often get a pair.
 
     Attributes:
       rows: of images and matrices.
@@ -90,7 +90,7 @@ def values_of(
       alike: what arrays have in common with others; without it each has its own size.
 
     Raises:
-      hypothesis.errors.ResolutionFailed: when values are drawn: nobody knows how to make one. Tell Hypothesis, by
+      hypothesis.errors.ResolutionFailed: when values are drawn: there is no way to make one. Tell Hypothesis, by
         `register_type_strategy`.
 
     Examples:
@@ -168,7 +168,7 @@ def _made(hint: Any, limits: tuple[Any, ...], alike: Alike | None) -> st.SearchS
 
 
 def _within(strategy: st.SearchStrategy[Any], hint: Any, limits: tuple[Any, ...]) -> st.SearchStrategy[Any]:
-    """Leave out what breaks a limit that the strategy could not be told of."""
+    """Omit values that violate a limit that the strategy does not support."""
     if not limits:
         return strategy
     spec = ParameterSpec("value", hint, None, limits)
@@ -429,7 +429,7 @@ def _arrays(facts: ArrayFacts, alike: Alike | None) -> st.SearchStrategy[Any]:
 
 
 def _chosen(shapes: tuple[tuple[int | None, ...], ...], channels: int) -> tuple[int | None, ...]:
-    """Return the shape with so many channels, else the first."""
+    """Return the shape with that number of channels, otherwise the first."""
     wanted = (None, None) if channels == 1 else (None, None, channels)
     return wanted if wanted in shapes else shapes[0]
 

@@ -3,7 +3,7 @@
 memory    within one process, with faults to order: for tests
 zenoh     between processes and hosts, by Zenoh: pip install 'hfg[zenoh]'
 
-Stands on floors 0 and 1 of hfg alone; hfg itself never imports it, so others can add transports as equals.
+Depends only on the lowest layers of hfg; hfg itself never imports it, so others can add transports as equals.
 """
 
 __all__: list[str] = []

@@ -31,7 +31,7 @@ _MOST_WAITING: Final = 65_536  # datagrams of one session whose loop does not co
 
 @dataclass(frozen=True)
 class Faults:
-    """What a network does to datagrams, each by itself on its way to each receiver.
+    """The effects of a network on datagrams, independently for each datagram and receiver.
 
     Attributes:
       loss: the chance that it never arrives.
@@ -52,12 +52,12 @@ _Kept = TypeVar("_Kept", bound="_Part")
 
 
 class Network:
-    """What sessions have in common that can hear each other.
+    """Shared state of sessions that can reach each other.
 
     Args:
-      faults: what it does to datagrams; may be set anew at any time. Presence and questions suffer from cuts alone.
+      faults: what it does to datagrams; may be replaced at any time. Presence and questions are affected only by cuts.
       seed: of the chances.
-      lease_s: after how long somebody who was cut off is told as gone.
+      lease_s: after how long a session that was cut off is reported as gone.
       largest_message: the most bytes of a datagram.
 
     Attributes:
@@ -116,7 +116,7 @@ class Network:
     # --- what sessions do
 
     def reaches(self, one: MemorySession, other: MemorySession) -> bool:
-        """Whether a cut is between them."""
+        """Return whether a cut is between them."""
         return one is other or not (one.is_cut or other.is_cut)
 
     def put(self, sender: MemorySession, key: str, message: Message) -> None:
@@ -158,7 +158,7 @@ class Network:
                 self._subscriptions.pop(one.key, None)
 
     def announce(self, one: _Announcement) -> None:
-        """Tell all who watch that somebody has come."""
+        """Report to all watchers that a name was announced."""
         with self._lock:
             if any(other.session is one.session and other.name == one.name for other in self._names):
                 raise TransportError(f'"{one.name}" is announced by this session already: close that first')
@@ -166,7 +166,7 @@ class Network:
             self._look_now()
 
     def withdraw(self, one: _Announcement) -> None:
-        """Tell all who watch that somebody has gone; a session that is cut off is not heard at once."""
+        """Report to all watchers that a name has gone; for a session that is cut off, later."""
         with self._lock:
             self._names.pop(one, None)
             if one.session.is_cut:
@@ -194,7 +194,7 @@ class Network:
                 watch.tell(new, present=True)
 
     def _look_later(self) -> None:
-        """Who is not heard of for a lease is gone, for those who do not hear them."""
+        """A session that is silent for a lease counts as gone for those that cannot reach it."""
         for watch in tuple(self._watches):
             watch.session.call_later(self._lease_s, self._expire, watch)
 
@@ -216,7 +216,7 @@ class Network:
                 self._answers[one.name].remove(one)
 
     def answering(self, session: MemorySession, name: str) -> _Answering | None:
-        """Give who answers to a name, of those that can be heard."""
+        """Return who answers to a name, of those that can be heard."""
         with self._lock:
             found = [one for one in self._answers.get(name, ()) if self.reaches(session, one.session)]
             return found[0] if found else None
@@ -272,7 +272,7 @@ class MemorySession:
         return one
 
     def announce(self, name: str, metadata: bytes = b"") -> _Announcement:
-        """Say that somebody is here."""
+        """Announce a name."""
         self._check_open()
         one = _Announcement(self, _checked(name), metadata)
         self.network.announce(one)
@@ -369,7 +369,7 @@ class MemorySession:
             self.call_soon(self._loop.call_later, delay_s, function, *arguments)
 
     def _drain(self) -> None:
-        """Give each callback what has come for it, all at once."""
+        """Deliver all messages for each callback at once."""
         self._awake = False
         bursts: dict[_Subscription | _Watching, list[Any]] = {}
         for _ in range(len(self._inbox)):
@@ -406,7 +406,7 @@ class MemorySession:
 
 
 class _Part:
-    """What goes on in a session until it is closed."""
+    """Something that lasts in a session until it is closed."""
 
     def __init__(self, session: MemorySession) -> None:
         self.session = session
@@ -468,7 +468,7 @@ class _Watching(_Part):
         self.known: dict[_Announcement, None] = {}
 
     def covers(self, name: str) -> bool:
-        """Whether a name is at or below the prefix."""
+        """Return whether a name is at or below the prefix."""
         return name == self.prefix or name.startswith(f"{self.prefix}/")
 
     def tell(self, who: _Announcement, *, present: bool) -> None:
@@ -540,7 +540,7 @@ class _Memory:
         self._networks: dict[str, Network] = {}
 
     def network(self, name: str = "default") -> Network:
-        """Give the network of a name, to set its faults and to cut sessions off."""
+        """Return the network of a name, to set its faults and to cut sessions off."""
         return self._networks.setdefault(name, Network())
 
     async def open(self, *, network: Network | str = "default", host: str = "here") -> MemorySession:

@@ -200,7 +200,7 @@ def missions(seeds: Sequence[int], minutes: float) -> list[dict[str, Any]]:
 
 
 def counted() -> str:
-    """Give the table of what can be counted."""
+    """Return the table of what can be counted."""
     columns: dict[Sort, dict[str, int]] = {}
     for sort in KINDS:
         parts = lines(sort)
@@ -211,7 +211,7 @@ def counted() -> str:
 
 
 def measured(runs: Sequence[dict[str, Any]]) -> str:
-    """Give the table of missions: the median, and the least and most of all seeds."""
+    """Return the table of missions: the median, and the least and most of all seeds."""
     shown: dict[str, Callable[[dict[str, Any]], float]] = {
         "cubes delivered": lambda run: run["delivered"],
         "delivered wrong": lambda run: run["wrong"],

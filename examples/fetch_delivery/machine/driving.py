@@ -177,5 +177,5 @@ class Dock:
 
 
 def _ended(twist: Twist | None) -> Step:
-    """Give the step of a law that ends by itself."""
+    """Return the step of a law that ends by itself."""
     return (Twist(), "done") if twist is None else (twist, None)

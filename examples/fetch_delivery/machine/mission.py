@@ -134,7 +134,7 @@ STATES: Final[list[Any]] = [
 
 
 def _visit(visit: str) -> list[Any]:
-    """Give what leads from state to state within a visit; `served` and `failed` lead out of it."""
+    """Return what leads from state to state within a visit; `served` and `failed` lead out of it."""
     states = ("go_to", "position", "dock", "settle", "wait", "leave")
     in_a_row = [["done", f"{visit}/{one}", f"{visit}/{other}"] for one, other in pairwise(states)]
     return [*in_a_row, ["lost", [f"{visit}/{state}" for state in ("position", "dock", "wait")], f"{visit}/retreat"]]

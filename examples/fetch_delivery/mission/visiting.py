@@ -22,13 +22,13 @@ from hfg.nodes.robotics import Disk
 
 @hfg.node
 def always(tick: Scan, *, value: bool = False) -> bool:
-    """Give a value again and again."""
+    """Return a value again and again."""
     return value
 
 
 @hfg.node
 def as_lamp(command: bool) -> bool:
-    """Give a command of no declared type as one for the lamp."""
+    """Return a command of no declared type as one for the lamp."""
     return command
 
 

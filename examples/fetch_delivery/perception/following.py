@@ -49,7 +49,7 @@ LIMITS: Final = Limits()
 
 
 def follow(path: Path, localised: Localised, scan: Scan, speed: float = 0.0, limits: Limits = LIMITS) -> Twist | None:
-    """Give the velocity for the next moment, in the robot's frame; None if the robot is there.
+    """Return the velocity for the next moment, in the robot's frame; None if the robot is there.
 
     Args:
       path: in the map frame.
@@ -106,7 +106,7 @@ def _in_frame(places: Any, pose: Any) -> Any:
 
 
 def _ahead(points: Any, place: Any, foresight: float) -> tuple[float, Any]:
-    """Give how long the rest of the path is, and the point on it that lies so far ahead."""
+    """Return how long the rest of the path is, and the point on it that lies so far ahead."""
     steps = np.diff(points, axis=0)
     lengths = np.maximum(np.hypot(steps[:, 0], steps[:, 1]), 1e-9)
     share = np.clip(((place - points[:-1]) * steps).sum(1) / lengths**2, 0, 1)

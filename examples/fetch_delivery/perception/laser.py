@@ -26,7 +26,7 @@ def obstacle_ahead(
     direction: Annotated[float, Interval(ge=-math.pi, le=math.pi)] = 0.0,
     width: Annotated[float, Interval(gt=0, le=2 * math.pi)] = 0.7,
 ) -> float:
-    """Give how far from the robot's centre the nearest thing in a sector is; infinite if there is none.
+    """Return how far from the robot's centre the nearest thing in a sector is; infinite if there is none.
 
     Args:
       scan: of the laser.
@@ -73,7 +73,7 @@ def wall_ahead(scan: Scan, *, width: Annotated[float, Interval(gt=0, le=math.pi)
 
 
 def _straightest(points: Any) -> Any:
-    """Give the points on the line through two of them that has most points on it."""
+    """Return the points on the line through two of them that has most points on it."""
     some = points[:: max(1, len(points) // 24)]
     first, second = np.triu_indices(len(some), max(1, len(some) // 4))
     along = some[second] - some[first]
@@ -158,7 +158,7 @@ class FollowRobots(hfg.Node):
 
 
 def foreign(scan: Scan, localised: Localised) -> Any:
-    """Give the points of a scan that are not part of the arena, in the map frame, in the order of the beams."""
+    """Return the points of a scan that are not part of the arena, in the map frame, in the order of the beams."""
     points = scan_points.function(scan.ranges, scan.angles, max_range=scan.max_range)
     cos, sin = math.cos(localised.pose[2]), math.sin(localised.pose[2])
     places = points @ np.array([[cos, sin], [-sin, cos]]) + localised.pose[:2]

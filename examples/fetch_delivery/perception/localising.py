@@ -180,25 +180,25 @@ class Localiser:
 
 
 def _alike(found: list[tuple[Any, float]]) -> list[tuple[Any, float]]:
-    """Give those that fit about as well as the best."""
+    """Return those that fit about as well as the best."""
     best = max((fit for _, fit in found), default=0.0)
     return [one for one in found if one[1] > best - 2 * _MARGIN]
 
 
 def _apart(pose: Any, other: Any) -> int:
-    """Give by how many steps a pose is turned around the middle of the arena, against another that looks the same."""
+    """Return by how many steps a pose is turned around the middle of the arena, against another that looks the same."""
     return round(float(wrapped(pose[2] - other[2])) / shape.STEP) % shape.WALL_SIDES
 
 
 def _turned(pose: Any, steps: int) -> Any:
-    """Give a pose after a turn around the middle of the arena."""
+    """Return a pose after a turn around the middle of the arena."""
     turn = steps * shape.STEP
     cos, sin = math.cos(turn), math.sin(turn)
     return np.array([cos * pose[0] - sin * pose[1], sin * pose[0] + cos * pose[1], wrapped(pose[2] + turn)])
 
 
 def _quality(points: Any, pose: Any) -> float:
-    """Give how many of the points lie on the shape, of those that nothing else can explain.
+    """Return how many of the points lie on the shape, of those that nothing else can explain.
 
     What lies in the free may be another robot. What lies beyond the wall or within the octagon, or on neither although
     the octagon would have been in the way, speaks against the pose.
@@ -214,7 +214,7 @@ def _quality(points: Any, pose: Any) -> float:
 
 
 def _fit(points: Any, pose: Any) -> float:
-    """Give the logarithm of how likely the points are from a pose; what lies far off says no more than what is off.
+    """Return the logarithm of how likely the points are from a pose; what lies far off says no more than what is off.
 
     Neighbouring beams err alike, so they count as a fifth of what they would count for by themselves.
     """

@@ -47,7 +47,7 @@ class Path:
 
 
 def plan(start: Any, goal: Any, others: Sequence[Disk] = (), *, beside: bool = False) -> Vector | None:
-    """Give the points of a path from one place of the map frame to another; None if there is none.
+    """Return the points of a path from one place of the map frame to another; None if there is none.
 
     Args:
       start: where the robot is.
@@ -74,7 +74,7 @@ def plan(start: Any, goal: Any, others: Sequence[Disk] = (), *, beside: bool = F
 
 
 def queue(start: Any, goal: Any, others: Sequence[Disk], lane: float) -> tuple[Vector, float] | None:
-    """Give the path to where a robot can wait, and its heading there, if its goal is taken.
+    """Return the path to where a robot can wait, and its heading there, if its goal is taken.
 
     A goal before a station is taken while another robot is in the lane that leads on from there to the station, and is
     nearer to its end: of two that come at the same time one goes on. Who waits does it where the other one has room to
@@ -108,7 +108,7 @@ def queue(start: Any, goal: Any, others: Sequence[Disk], lane: float) -> tuple[V
 
 
 def _from_lane(place: Any, first: Any, last: Any) -> Any:
-    """Give how far places are from a line between two."""
+    """Return how far places are from a line between two."""
     along = last - first
     length = max(float(along @ along), 1e-9)
     share = np.clip((place - first) @ along / length, 0, 1)
@@ -128,7 +128,7 @@ def _far(x: float, y: float) -> Any:
 
 
 def _nearest(free: Any, place: Any) -> Any:
-    """Give the middle of the nearest cell that is free; the place itself if it lies in one, or if there is none."""
+    """Return the middle of the nearest cell that is free; the place itself if it lies in one, or if there is none."""
     row, column = (int(at) for at in np.clip((np.asarray(place) + _SIDE) / CELL, 0, len(_AT) - 1))
     if free[row, column] or not free.any():
         return np.asarray(place)
@@ -193,10 +193,10 @@ class PlanPath(hfg.Node):
 
 
 def length_of(points: Any) -> float:
-    """Give how long a path is."""
+    """Return how long a path is."""
     return float(np.hypot(*np.diff(points, axis=0).T).sum()) if len(points) > 1 else 0.0
 
 
 def heading_towards(start: Any, goal: Any) -> float:
-    """Give the direction from one place to another."""
+    """Return the direction from one place to another."""
     return math.atan2(goal[1] - start[1], goal[0] - start[0])

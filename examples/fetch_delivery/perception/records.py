@@ -87,7 +87,7 @@ class Localised:
         return self.quality > 0.6
 
     def place(self, x: float, y: float) -> tuple[float, float]:
-        """Give where a point of the robot's frame is in the map."""
+        """Return where a point of the robot's frame is in the map."""
         cos, sin = math.cos(self.pose[2]), math.sin(self.pose[2])
         return float(self.pose[0] + cos * x - sin * y), float(self.pose[1] + sin * x + cos * y)
 
@@ -126,11 +126,11 @@ class Station(NamedTuple):
     sightings: int = 0
 
     def before(self, distance: float) -> Vector:
-        """Give the pose at a distance before the surface, that faces it."""
+        """Return the pose at a distance before the surface, that faces it."""
         heading = math.remainder(self.theta + math.pi, 2 * math.pi)
         return np.array([self.x + distance * math.cos(self.theta), self.y + distance * math.sin(self.theta), heading])
 
 
 def wrapped(angle: Any) -> Any:
-    """Give an angle between -pi and pi."""
+    """Return an angle between -pi and pi."""
     return np.remainder(angle + math.pi, 2 * math.pi) - math.pi

@@ -27,7 +27,7 @@ SEGMENTS: Final = np.concatenate([WALL, OCTAGON])
 
 
 def distances(places: Any) -> tuple[Any, Any]:
-    """Give how far places are inside of the wall, and how far outside of the octagon; negative is beyond."""
+    """Return how far places are inside of the wall, and how far outside of the octagon; negative is beyond."""
     far = np.hypot(places[..., 0], places[..., 1])
     at = np.arctan2(places[..., 1], places[..., 0])
     from_side = np.remainder(at, STEP) - STEP / 2

@@ -60,7 +60,7 @@ def find_targets(image: Gray) -> list[Sighting]:
 
 
 def _band(image: Any, top: int, bottom: int) -> tuple[Any, int]:
-    """Give some rows of a picture, and how many are above them; a picture of another size as it is."""
+    """Return some rows of a picture, and how many are above them; a picture of another size as it is."""
     return (image[top:bottom], top) if image.shape[0] == 480 else (image, 0)
 
 
@@ -80,7 +80,7 @@ def _target(one: Bullseye) -> Sighting | None:
 
 
 def _turned(ratio: float, right: float, lean: float, ahead: float) -> float:
-    """Give how far the right edge of a circle is turned away, or NaN if the picture does not tell.
+    """Return how far the right edge of a circle is turned away, or NaN if the picture does not tell.
 
     A circle that is `ratio` as wide as tall is turned to one side or the other. Which one tells the middle of its
     rings, which does not lie in the middle of its outermost ellipse; far away that is too little to be seen.
@@ -168,7 +168,7 @@ def _read(image: Any, corners: Any, prints: dict[str, Any]) -> tuple[str, float]
 
 @functools.cache
 def _prints() -> tuple[float, dict[str, Any]]:
-    """Give the side of a frame in metres, from outer edge to outer edge, and how each digit looks in it."""
+    """Return the side of a frame in metres, from outer edge to outer edge, and how each digit looks in it."""
     prints, side = {}, 0.0
     for digit in range(1, 5):
         panel = signs.digit_sign(digit, 512)

@@ -14,7 +14,7 @@ BESIDE = 0.11  # the angle by which a digit hangs to the left of its bull's-eye,
 
 
 def landmark(seen: Sighting, localised: Localised) -> Landmark:
-    """Give a sighting in the map frame, with how sure it is: the pose is not, and far signs are small."""
+    """Return a sighting in the map frame, with how sure it is: the pose is not, and far signs are small."""
     x, y = localised.place(seen.x, seen.y)
     arm = seen.distance**2 * float(localised.covariance[2, 2])
     pose = float(localised.covariance[0, 0] + localised.covariance[1, 1]) / 2
@@ -24,7 +24,7 @@ def landmark(seen: Sighting, localised: Localised) -> Landmark:
 
 
 def delivery_station(sign: Sign) -> Station:
-    """Give the station that a digit belongs to: its bull's-eye hangs on the wall, to the right of the digit."""
+    """Return the station that a digit belongs to: its bull's-eye hangs on the wall, to the right of the digit."""
     at = math.atan2(sign.y, sign.x) - BESIDE
     x, y = shape.WALL_APOTHEM * math.cos(at), shape.WALL_APOTHEM * math.sin(at)
     return Station(x, y, float(wrapped(at + math.pi)), int(sign.sightings))

@@ -50,7 +50,7 @@ def _coloured(picture: Picture, width: int) -> Picture:
 
 
 def _place(one: Sighting, height: float, size: float, scale: float) -> tuple[int, int, int]:
-    """Give where a sign is in the picture, and how large: back the way that perception has come."""
+    """Return where a sign is in the picture, and how large: back the way that perception has come."""
     far = max(one.x - AHEAD, 0.05)
     u = MIDDLE[0] - FOCAL * one.y / far
     v = MIDDLE[1] + FOCAL * (HEIGHT - height) / far

@@ -30,7 +30,7 @@ class Arena:
 
 
 def figure_15() -> Arena:
-    """Give the arena."""
+    """Return the arena."""
     return Arena()
 
 

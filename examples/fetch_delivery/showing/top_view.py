@@ -34,7 +34,7 @@ _LAMP: Final = (70, 210, 90)
 
 
 def _pixels(points: Any) -> Any:
-    """Give points of the arena as OpenCV takes them; y leads upwards."""
+    """Return points of the arena as OpenCV takes them; y leads upwards."""
     points = np.atleast_2d(np.asarray(points, np.float64))
     middle = SIDE / 2
     at = np.stack([middle + points[:, 0] * _PER_M, middle - points[:, 1] * _PER_M], axis=1)
@@ -61,13 +61,13 @@ def _middle_text(picture: Picture, text: str, place: Any, colour: Colour, size: 
 
 
 def digit_place(station: Station) -> tuple[float, float]:
-    """Give where the digit of a delivery station hangs."""
+    """Return where the digit of a delivery station hangs."""
     at, far = math.atan2(station.y, station.x) + DIGIT_BESIDE, math.hypot(station.x, station.y)
     return far * math.cos(at), far * math.sin(at)
 
 
 def corners(arena: Arena) -> tuple[Vector, Vector]:
-    """Give the corners of the wall and of the octagon."""
+    """Return the corners of the wall and of the octagon."""
     wall = 2 * math.pi * np.arange(WALL_PANELS) / WALL_PANELS
     octagon = math.pi / 4 * (np.arange(8) + 0.5)
     radius = arena.apothem / math.cos(math.pi / WALL_PANELS), OCTAGON_M / math.cos(math.pi / 8)

@@ -85,7 +85,7 @@ def _points(points: Iterable[Any]) -> str:
 
 
 def _path(points: Iterable[tuple[float, float]]) -> str:
-    """Give a path; it has a gap where a place is not known."""
+    """Return a path; it has a gap where a place is not known."""
     parts, last = [], None
     for x, y in points:
         if math.isnan(x):

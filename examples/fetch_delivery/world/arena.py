@@ -89,7 +89,7 @@ class Arena:
         self.stations = (*filling, *sorted(delivery, key=lambda station: station.number))
 
     def station(self, kind: Literal["filling", "delivery"], number: int) -> Station:
-        """Give one of the stations.
+        """Return one of the stations.
 
         Raises:
           ValueError: if there is none.
@@ -101,7 +101,7 @@ class Arena:
         raise ValueError(f"there is no {kind} station {number}; they are {numbers}")
 
     def nearest(self, x: float, y: float) -> Station:
-        """Give the station that is nearest."""
+        """Return the station that is nearest."""
         return min(self.stations, key=lambda station: station.distance(x, y))
 
     def _filling(self, number: int) -> Station:

@@ -153,7 +153,7 @@ class MujocoRenderer(Renderer):
 </mujoco>"""
 
     def _standing(self) -> str:
-        """Give the panels of the light renderer as thin boxes."""
+        """Return the panels of the light renderer as thin boxes."""
         named = {id(copies): name for name, copies in self._prints.items()}
         boxes = []
         for panels in (self._outer, self._inner):
@@ -200,7 +200,7 @@ def _rgb(shade: float) -> str:
 
 
 def _box(middle: Any, right: Any, up: Any, size: tuple[float, float], look: str, name: str = "") -> str:
-    """Give a thin box whose picture looks to where `right` and `up` are right and up."""
+    """Return a thin box whose picture looks to where `right` and `up` are right and up."""
     called = f'name="{name}" ' if name else ""
     axes = _numbers([*right, *up])
     return (
@@ -215,7 +215,7 @@ def _camera(name: str, camera: Camera) -> str:
 
 
 def _basket() -> str:
-    """Give its bottom, where the cube stands, and its sides: all darker than paper."""
+    """Return its bottom, where the cube stands, and its sides: all darker than paper."""
     bottom = BASKET.height - 0.05 - signs.CUBE_M / 2
     far, wide, high = 0.3, 0.2, 0.12
     ahead, left, above = np.eye(3)
@@ -231,7 +231,7 @@ def _basket() -> str:
 
 
 def _cube() -> str:
-    """Give a cube whose four sides bear a print."""
+    """Return a cube whose four sides bear a print."""
     half = signs.CUBE_M / 2
     inside = half - 2 * _THIN
     core = f'<geom type="box" size="{_numbers([inside, inside, half])}" rgba="{_rgb(_CUBE_SHADE)} 1"/>'

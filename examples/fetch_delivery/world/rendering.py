@@ -64,7 +64,7 @@ class Cube:
 
 
 def _standing(x: float, y: float, z: float, facing: float, half_width: float, half_height: float) -> Vector:
-    """Give the corners of an upright panel: top left, top right, bottom right, bottom left of who stands before it."""
+    """Return the corners of an upright panel: top left, top right, bottom right, bottom left, seen from its front."""
     left = np.array([math.sin(facing), -math.cos(facing), 0.0]) * half_width
     up = np.array([0.0, 0.0, half_height])
     middle = np.array([x, y, z])
@@ -238,7 +238,7 @@ class Renderer:
 
 
 def _camera(pose: tuple[float, float, float], camera: Camera) -> tuple[Vector, Vector]:
-    """Give where the camera is, and the matrix whose rows look right, down and ahead."""
+    """Return where the camera is, and the matrix whose rows look right, down and ahead."""
     x, y, theta = pose
     cos, sin = math.cos(theta), math.sin(theta)
     down, level = math.sin(camera.pitch), math.cos(camera.pitch)

@@ -167,6 +167,6 @@ def _against_octagon(robot: Robot, arena: Arena) -> None:
 
 
 def _moved(x: float, y: float, theta: float, dx: float, dy: float, turn: float) -> tuple[float, float, float]:
-    """Give a pose moved as seen from itself; a turn and a way at once are driven as an arc."""
+    """Return a pose moved as seen from itself; a turn and a way at once are driven as an arc."""
     cos, sin = math.cos(theta + turn / 2), math.sin(theta + turn / 2)
     return x + cos * dx - sin * dy, y + sin * dx + cos * dy, theta + turn

@@ -1,6 +1,7 @@
 """The oracle.
 
-What the rules say a graph does, written slowly and obviously, as a machine whose every decision is taken from outside.
+The behaviour of a graph according to the rules, written slowly and obviously, as a machine whose every decision is made
+from outside.
 
     structure      a graph as plain data, subgraphs dissolved
     waiting        an event loop turned by hand, for async node code
@@ -12,7 +13,8 @@ What the rules say a graph does, written slowly and obviously, as a machine whos
     machine        permitted moves, and what is done when it is quiet
     report         a run under a schedule
 
-It shares nothing with ports, activity rules or engine: an oracle that shares code with the accused is no oracle.
+It shares nothing with ports, activity rules or engine: an oracle that shares code with the system under test is
+useless.
 """
 
 from hfg.testing.reference.machine import Move, ReferenceMachine

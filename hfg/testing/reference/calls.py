@@ -90,7 +90,10 @@ class Calling(Tending):
         return actions[name]
 
     def launch_call(self, flight: Flight, handler: Callable[[], Any]) -> None:
-        """Run the handler where its group runs; what tears the node down behind its firings (F14) and its tasks."""
+        """Run the handler where its group runs.
+
+        A handler that tears the node down runs after its firings (F14) and tasks.
+        """
         station = flight.station
         automatic = flight.slot not in station.type.slots
         if automatic and self.begins_afresh(flight) and (station.is_flying or station.tasks):
@@ -175,7 +178,7 @@ class Calling(Tending):
         then()
 
     def reset_each(self, stations: Iterator[Station], then: Callable[[], None]) -> None:
-        """One after the other; who is amid a firing or call follows after that, and nobody waits for it (G2)."""
+        """One after the other; a node within a firing or call follows later, and the others do not wait for it (G2)."""
         for station in stations:
             if station.is_amid or station.tasks:
                 station.afterwards = station.afterwards or "reset"
@@ -196,14 +199,14 @@ class Calling(Tending):
         return has_work and station.set_up and self.structure.threads.get(station.leaf.options.group, 0) > 0
 
     def end_reset(self, flight: Flight, then: Callable[[], None], _result: Any, _error: BaseException | None) -> None:
-        """What a subgraph around the node has asked for is done."""
+        """The request of a subgraph around the node is done."""
         self.reset(flight.station)
         flight.station.flights.remove(flight)
         self.be_idle(flight.station)
         then()
 
     def reset(self, station: Station) -> None:
-        """A9: it has not ended, so what was to end it behind firings whose turn has not come does so no more (F14)."""
+        """A9: it has not ended, so a pending end after firings whose turn has not come is cancelled (F14)."""
         for flight in [flight for flight in station.firings_under_way if flight.waits_to_end]:
             station.flights.remove(flight)
             self.observe(FiringEnded(self.now, station.path, flight.number, "abandoned"))
@@ -218,7 +221,7 @@ class Calling(Tending):
             self.set_up(station)
 
     def not_ended(self, station: Station) -> None:
-        """It begins afresh, and so do its events (P9); a restart alone does not make it so (X1)."""
+        """It starts over, and so do its events (P9); a restart does not have this effect (X1)."""
         station.ending = station.ended = station.given_up = False
         self.renew_operators(station)
 
@@ -257,7 +260,7 @@ class Calling(Tending):
         return [self.stations[member] for member in self.structure.boxes[-2 - owner].members]
 
     def enable(self, owner: int) -> None:
-        """Rule F10: starts afresh; A(v) is kept."""
+        """Rule F10: start over; A(v) is kept."""
         members = self.members_of(owner)
         before = [self.is_enabled(station.leaf.index) for station in members]
         if self._set_enabled(owner, True):
@@ -271,7 +274,7 @@ class Calling(Tending):
             self.settle()
 
     def disable(self, owner: int) -> None:
-        """Rule F10: what lies on the inputs and in the queues is discarded, and what nobody took from the outputs."""
+        """Rule F10: tokens on the inputs and in the queues are discarded, and untaken tokens of the outputs."""
         members = self.members_of(owner)
         before = [self.is_enabled(station.leaf.index) for station in members]
         if self._set_enabled(owner, False):

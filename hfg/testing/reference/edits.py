@@ -1,8 +1,8 @@
 """A machine whose graph is edited on the way (rule R4).
 
-Commands are carried out on the machine's own drawing; then all of it is dissolved afresh, and what was there before is
-found again: stations by their nodes, lines by their ends. What is gone lets go what lay on it. Sees how drawings are
-edited, and shares nothing with what runs them.
+Commands are carried out on the machine's own drawing; then it is dissolved again, and existing parts are identified:
+stations by their nodes, lines by their ends. What is gone lets go what lay on it. Sees how drawings are edited, and
+shares nothing with what runs them.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Editing(Calling):
         self.settle()
 
     def _note_missed_timeouts(self) -> None:
-        """A12: what nobody was connected to when its time was over does not come later."""
+        """A12: a timeout without a receiver at its time is not delivered later."""
         for owner in [*range(len(self.stations)), *(-2 - box.index for box in self.structure.boxes)]:
             if owner >= 0:
                 since, limit = self.stations[owner].active_since, self.stations[owner].leaf.options.active_for_s
@@ -131,7 +131,7 @@ class Editing(Calling):
     def _begin_and_end(
         self, before: Sequence[Station], swapped: Set[int], new: Sequence[Line], lost: Sequence[Line]
     ) -> None:
-        """What has come begins, then what has gone ends."""
+        """Start added nodes, then end removed ones."""
         were = {id(station) for station in before}
         for station in self.stations:
             if id(station) not in were:
@@ -286,7 +286,7 @@ class Editing(Calling):
                 self.disable(owner)
 
     def _disable_for_good(self, boxes: dict[int, int], stay: set[int]) -> None:
-        """What was in a disabled subgraph that is no more stays disabled (G1)."""
+        """Nodes of a disabled subgraph that was removed stay disabled (G1)."""
         for node, index in boxes.items():
             if node not in stay and not self.box_enabled[index]:
                 for member in self.structure.boxes[index].members:

@@ -125,7 +125,7 @@ class Firing(RunningCode):
         return "process"
 
     def set_parameters(self, station: Station, taken: Taken) -> Exception | None:
-        """P8: a value that is taken sets the parameter, also in a silent firing."""
+        """P8: a value that is taken sets the parameter, even in a silent firing."""
         for line, lying in taken:
             if line.edge.target.kind == "parameter" and not lying.token.is_marker:
                 try:
@@ -250,7 +250,7 @@ class Firing(RunningCode):
         self.go_on_iterating(flight)
 
     def go_on_iterating(self, flight: Flight) -> None:
-        """Give the next element inside; after the last the lists are the outputs."""
+        """Send the next element inside; after the last one, the lists are the outputs."""
         station = flight.station
         assert flight.elements is not None
         if not flight.elements:
@@ -342,7 +342,7 @@ class Firing(RunningCode):
         self.be_idle(station)
 
     def announce(self, flight: Flight, outcome: str) -> None:
-        """A9: behind the outputs what left by each of them, in order, with its stamp; then that it is processed."""
+        """A9: after the outputs, signal the tokens of each, in order, with their stamps; then `processed`."""
         changes = flight.station.changes
         for name in flight.station.type.outputs if outcome in ("done", "ended") and not flight.void else ():
             if name not in flight.writes:
@@ -379,7 +379,7 @@ class Firing(RunningCode):
         raise NotImplementedError
 
     def cancel_tasks(self, station: Station) -> None:
-        """Let what its code has started beside its firings end."""
+        """End the tasks that its code has started."""
         raise NotImplementedError
 
     def shipments(self, flight: Flight, outcome: str) -> list[tuple[Line, Any, int | None, float]]:
@@ -452,13 +452,16 @@ class Firing(RunningCode):
         self.end_firing(flight, outcome, failure)
 
     def policy_of(self, station: Station) -> str:
-        """What becomes of a failure; one amid a restart belongs to it, and does not count against the limit (F14)."""
+        """Return the policy for a failure.
+
+        One during a restart belongs to the restart, and does not count against the limit (F14).
+        """
         options = station.leaf.options
         limited = options.on_error == "restart" and not station.is_restarting
         return "stop" if limited and station.restarts >= options.restart_limit else str(options.on_error)
 
     def may_try_again(self, flight: Flight, error: BaseException) -> bool:
-        """Return whether there is another attempt: of its function alone, and as long as none has sent a signal."""
+        """Return whether there is another attempt: only of its function, and as long as none has sent a signal."""
         return (
             flight.kind == "process"
             and isinstance(error, Exception)
@@ -486,7 +489,7 @@ class Firing(RunningCode):
         self.observe(FiringRetried(self.now, path, flight.number, flight.attempts, str(error), pause))
 
     def rest(self, station: Station) -> None:
-        """X1: the back-off of a restart begins, of several firings behind the last that is under way (F14)."""
+        """X1: the back-off of a restart begins; with several firings, after the last one in progress (F14)."""
         pause = station.leaf.options.restart_backoff_s * 2 ** (station.restarts - 1)
         station.resting_until = self.now + pause
 

@@ -1,7 +1,7 @@
 """The reference machine: which moves the rules permit, and what each of them does.
 
 `moves()` lists every decision that a scheduler may take now; `apply(move)` takes one and gives what an observer sees of
-it. Where it is quiet, the steps that follow from quiet alone are the moves: time goes on (R6), operators complete (P9),
+it. Where it is quiet, the steps that follow only from quiet are the moves: time advances (R6), operators complete (P9),
 events end (F13), the run ends (R5).
 """
 
@@ -39,12 +39,12 @@ class Move:
 
     Attributes:
       kind: "fire" node; "call" a slot of node with the token of `edge`; "go on" with the firing or call of node;
-        "task": go on with what its code has started beside them;
-        "time out" the firing of node (X2); "timer": what a timer of node, or the operators of `edge`, waited for;
-        "feed" the graph's input `edge`, "read" the output at the end of `edge` (P10); "wait" until `time`;
-        "grow" the queue of `edge`; "give up" sources; "complete" operators; "end events"; "finish" the run.
+        "task": resume a task that its code has started; "time out" the firing of node (X2); "timer": what a timer of
+        node, or the operators of `edge`, waited for; "feed" the graph's input `edge`, "read" the output at the end of
+        `edge` (P10); "wait" until `time`; "grow" the queue of `edge`; "give up" sources; "complete" operators; "end
+        events"; "finish" the run.
       outcome: of "finish".
-      number: of "go on" and "time out": which of the node's firings, if several may be under way (F14); else 0.
+      number: of "go on" and "time out": which of the node's firings, if several may be in progress (F14); otherwise 0.
         Of "task": which of the node's tasks.
     """
 
@@ -95,7 +95,7 @@ class ReferenceMachine(Rings):
     Args:
       graph: as built; its nodes are copied, so it can be run elsewhere too.
       until_s: the run ends when time would go beyond it.
-      held_open: somebody outside may still send something, so quiet does not end the run.
+      held_open: tokens may still come from outside, so quiet does not end the run.
     """
 
     def __init__(self, graph: Any, *, until_s: float | None = None, held_open: bool = False) -> None:
@@ -128,7 +128,7 @@ class ReferenceMachine(Rings):
         return self.observed_since(0)
 
     def place_by_operators(self, before: int) -> None:
-        """What operators say when they are connected enables as it arrives, among the calls that arrive so (F9, P9)."""
+        """Let tokens that operators emit when connected enable firings in order of arrival, like calls (F9, P9)."""
         for station in self.stations:
             index = station.leaf.index
             into = [line for line in self.lines if line.edge.target.owner == index and line.edge.target.kind == "input"]
@@ -137,7 +137,7 @@ class ReferenceMachine(Rings):
                 station.place = arrived
 
     def observed_since(self, mark: int) -> list[TraceEvent]:
-        """What was seen after the first `mark` events."""
+        """Return the events after the first `mark`."""
         return self.observed[mark:]
 
     # --- what may happen
@@ -158,7 +158,7 @@ class ReferenceMachine(Rings):
         return found
 
     def owed_moves(self) -> list[Move]:
-        """Return the moves of which one must be taken before anybody may call it quiet."""
+        """Return the moves of which one must be taken before the run counts as quiet."""
         if self.outcome is not None:
             return []
         moot = self.moot_sources()
@@ -177,7 +177,7 @@ class ReferenceMachine(Rings):
         return move.kind == "call" or (move.kind == "go on" and self.stations[index].is_calling)
 
     def working_moves(self, only: Collection[int] | None = None) -> list[Move]:
-        """Firings, calls, and what goes on in those under way, of all nodes or `only` of some; and rings that grow."""
+        """Return firings, calls, and next steps of those in progress, of all nodes or `only` some; and full rings."""
         found = self.moves_at_the_border()
         for index, station in enumerate(self.stations):
             if only is not None and index not in only:
@@ -193,7 +193,7 @@ class ReferenceMachine(Rings):
         return found
 
     def moves_at_the_border(self) -> list[Move]:
-        """What comes from outside or is taken there, timers, slots of the graph and of subgraphs, and rings (F8)."""
+        """Return moves of tokens from and to the outside, timers, slots of the graph and of subgraphs, and rings."""
         found = [Move("feed", edge=name) for name, values in self.feeding.items() if values and self.can_feed(name)]
         found += self.timers_due()
         found += [Move("read", edge=line.edge.label) for line in self.lines if line.queue and self.is_read(line)]
@@ -204,7 +204,7 @@ class ReferenceMachine(Rings):
         return found + [Move("grow", edge=line.edge.label) for line in self.queues_to_grow()]
 
     def moves_of(self, flight: Flight, index: int, station: Station) -> list[Move]:
-        """How a firing or call that is under way may go on."""
+        """Return how a firing or call in progress may continue."""
         found = []
         number = flight.number if station.is_concurrent and flight.what == "firing" else 0
         if self.can_go_on(flight):
@@ -219,14 +219,14 @@ class ReferenceMachine(Rings):
         return flight.what == "firing" and flight.task is not None and flight.then is not None
 
     def under_way(self, move: Move) -> Flight:
-        """What a move goes on with."""
+        """Return the firing or call that a move resumes."""
         station = self.stations[self.paths[move.node]]
         if move.number:
             return next(one for one in station.firings_under_way if one.number == move.number)
         return next((one for one in station.flights if one.what == "call"), station.flights[0])
 
     def task_of(self, move: Move) -> Task:
-        """Which task a move goes on with."""
+        """Return the task that a move resumes."""
         return next(task for task in self.stations[self.paths[move.node]].tasks if task.number == move.number)
 
     def can_feed(self, name: str) -> bool:
@@ -234,7 +234,10 @@ class ReferenceMachine(Rings):
         return not any(self.is_occupied(line) for line in self.lines_from(ROOT, "output", name))
 
     def is_read(self, line: Line) -> bool:
-        """Whether somebody outside takes what lies there: of iterating subgraphs always, of the graph as is said."""
+        """Return whether tokens there are taken from outside.
+
+        Always for iterating subgraphs; as configured for the graph.
+        """
         target = line.edge.target
         return self.is_outside(target.owner) and target.kind == "input" and target.name not in self.unread
 
@@ -244,7 +247,7 @@ class ReferenceMachine(Rings):
         return not self.is_moving_inside(index, inside)
 
     def is_moving_inside(self, index: int, inside: Set[int]) -> bool:
-        """Return whether something happens inside an iterating subgraph, or will when time goes on."""
+        """Return whether something happens inside an iterating subgraph, or will when time advances."""
         boxes = [box for box in self.structure.boxes if inside & set(box.members)]
         paths = {self.stations[number].path for number in inside} | {box.path for box in boxes}
         for move in self.working_moves(inside):
@@ -269,7 +272,7 @@ class ReferenceMachine(Rings):
         return works or station.resting_until is not None or self.waits_for_rate(index)
 
     def waits_for_rate(self, index: int) -> bool:
-        """Return whether it fires when its time has come, or is held by a full queue alone then."""
+        """Return whether it fires when its time has come, or is then held back only by a full queue."""
         if self.may_fire(index, ignore="timers"):
             return True
         by_time = self.is_held_by_time(index) or self.is_resting(index)
@@ -338,7 +341,7 @@ class ReferenceMachine(Rings):
     def closing_move(self) -> Move:
         """What is next when only the end is left.
 
-        Sources for ended nodes are given up (R5), operators give out what they hold (P9), events end (F13), then R5.
+        Sources for ended nodes are stopped (R5), operators emit what they hold (P9), events end (F13), then R5.
         """
         if self.sources_to_give_up():
             return Move("give up")
@@ -377,7 +380,7 @@ class ReferenceMachine(Rings):
         return min((time for time in times if time is not None), default=None)
 
     def events_to_end(self) -> list[Line]:
-        """F13: live event edges into inputs whose queues are empty, once an edge; who has ended needs no telling."""
+        """F13: live event edges into inputs whose queues are empty, once per edge; ended nodes need no END."""
         return [
             line
             for line in self.lines
@@ -520,7 +523,7 @@ class ReferenceMachine(Rings):
         return moment is not None and self.is_over(moment)
 
     def time_of_timeout(self, owner: int) -> float | None:
-        """When that will be; None if never, or if nobody is connected."""
+        """Return when that will be; None if never, or without a receiver."""
         if owner >= 0:
             since, limit = self.stations[owner].active_since, self.stations[owner].leaf.options.active_for_s
         else:
@@ -603,7 +606,7 @@ class ReferenceMachine(Rings):
         self.observe(RunEnded(self.now, self.outcome))
 
     def end_code(self) -> None:
-        """X3: all code under way is cancelled and may take its time, within one limit for all of it."""
+        """X3: all running code is cancelled and may take its time, within one limit for all of it."""
         until = self.now + TEARDOWN_LIMIT_S
         code: dict[Flight | Task, Any] = {}
         for station in self.stations:
@@ -634,7 +637,7 @@ class ReferenceMachine(Rings):
         return hook is None or self.run_within(hook, TEARDOWN_LIMIT_S)
 
     def close(self) -> bool:
-        """Throw away what is under way; whether all tasks have ended well.
+        """Discard work in progress. Return whether all tasks have ended well.
 
         By hand only for a run that is not taken to its end.
         """

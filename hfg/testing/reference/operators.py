@@ -1,6 +1,6 @@
-"""Reactivex operators on an edge (rule P9), in the time of whoever holds the machine.
+"""Reactivex operators on an edge (rule P9), in the time of the machine's owner.
 
-Tokens are pushed in, what comes out is given on as tokens; timers of operators wait until `advance`. Stands on
+Tokens are pushed in, what comes out is given on as tokens; timers of operators wait until `advance`. Depends on
 reactivex and tokens.
 """
 
@@ -36,7 +36,7 @@ class _Clock(Scheduler):
         return self.to_datetime(self.seconds)
 
     def schedule(self, action: Any, state: Any = None) -> Any:
-        """Do it as soon as what goes on now is over."""
+        """Do it as soon as the current work is over."""
         disposable = SingleAssignmentDisposable()
         self._at_once.append((action, state, disposable))
         return disposable
@@ -101,7 +101,7 @@ class Operators:
         self._clock.catch_up()
 
     def complete(self) -> None:
-        """Let them give out what they hold."""
+        """Let them emit what they hold."""
         self._subject.on_completed()
         self._clock.catch_up()
 

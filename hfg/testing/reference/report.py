@@ -65,7 +65,7 @@ def reference_run(
 
     Raises:
       RuntimeError: after `max_moves` moves the run is not over.
-      UsageError: it is no graph.
+      UsageError: it is not a graph.
 
     Examples:
       >>> import hfg

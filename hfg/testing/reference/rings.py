@@ -1,8 +1,8 @@
-"""Rings that only full queues close (rule F8), by the words of the rule: slowly, anew at each step.
+"""Rings that only full queues close (rule F8), literally by the rule: slowly, from scratch at each step.
 
-A *deed* is what somebody may wait for: that a node fires, is called, triggers, ends what it does, or has room. All
-that are waited for are collected, those that may come about are crossed out until nothing changes, and of what is left
-a ring is all that waits for each other.
+A *deed* is something that can be waited for: that a node fires, is called, triggers, ends what it does, or has room.
+All that are waited for are collected, those that may come about are crossed out until nothing changes, and of what is
+left a ring is all that waits for each other.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ class Rings(Editing):
         return mandatory <= connected and (bool(waited) or station.type.is_source)
 
     def _is_held_by_queue(self, station: Station, deeds: frozenset[_Deed]) -> bool:
-        """Whether F8 holds its next firing by itself: not beside a rate, a gate or `ready()`, and not beside a call."""
+        """Whether F8 holds its next firing by itself: not in combination with a rate, a gate, `ready()` or a call."""
         index = station.leaf.index
         if any(self._waits_for_room(station, flight) for flight in station.flights):
             return True
@@ -233,7 +233,7 @@ class Rings(Editing):
         return _Deed(target.owner, "happen" if self.is_outside(target.owner) else "fire")
 
     def _is_at_work(self, flight: Flight) -> bool:
-        """Return whether a firing or call is under way that waits neither for room nor for the firings before it."""
+        """Return whether a firing or call is in progress that waits neither for room nor for the firings before it."""
         if flight.over is not None or flight.waits_to_end:
             return False
         return not self._waits_for_room(flight.station, flight)

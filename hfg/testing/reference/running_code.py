@@ -2,8 +2,8 @@
 
 At once on the loop, in steps where it waits, out of sight in a thread (rules F3, R1, X2).
 
-A `Flight` is a firing or call under way. What its code writes is kept in it; what it triggers leaves at once, or from a
-thread when the machine delivers it.
+A `Flight` is a firing or call in progress. It keeps the values that its code writes; triggered signals leave at once,
+or from a thread when the machine delivers it.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class RunningCode(Sending):
                 station.node.ports.parameters[name]._tell = partial(self._show, station, name)
 
     def _show(self, station: Station, name: str, value: Any) -> None:
-        """The node has set what it alone sets (P8, R7)."""
+        """The node has set a read-only parameter (P8, R7)."""
         flight = self.flight_of(station)
         if flight is not None and flight.in_thread:
             flight.signals.append((name, value, None, None))
@@ -115,11 +115,11 @@ class RunningCode(Sending):
         return 0 if is_outdated and activity is None else activity
 
     def start_task(self, station: Station, coroutine: Coroutine[Any, Any, Any]) -> None:
-        """Run it beside the firings of the node."""
+        """Run it concurrently with the firings of the node."""
         raise NotImplementedError
 
     def has_no_room(self, station: Station) -> bool:
-        """Return whether a queue behind an event of the node is full, which holds back its firings too (F8)."""
+        """Return whether a queue fed by an event of the node is full, which holds back its firings too (F8)."""
         return bool(self.full_lines(station.leaf.index))
 
     @contextmanager
@@ -182,7 +182,7 @@ class RunningCode(Sending):
         raise NotImplementedError
 
     def go_on_iterating(self, flight: Flight) -> None:
-        """Give the next element inside."""
+        """Send the next element inside."""
         raise NotImplementedError
 
     def run_end(self, flight: Flight) -> None:

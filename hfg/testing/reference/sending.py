@@ -1,8 +1,8 @@
-"""What happens to tokens that leave, and to activity with them (rules T1-T5, P5, F3, F12, A3-A9).
+"""The handling of tokens that leave, and of their activity (rules T1-T5, P5, F3, F12, A3-A9).
 
 One sending is all edges of one output set, or of one trigger. It is put in full before anything follows from it; what
-follows (automatic events, tokens that
-are processed at once, outputs that become free) is done by `settle` until nothing changes.
+follows (automatic events, tokens that are processed at once, outputs that become free) is done by `settle` until
+nothing changes.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Sending(State):
             self.quench(-2 - sender, "sent")
 
     def quench(self, box: int, cause: Cause) -> None:
-        """Take the activity from everything inside a subgraph, tokens on their way included."""
+        """Take the activity from everything inside a subgraph, including tokens in transit."""
         for line in self.lines_inside(box):
             for lying in line.queue:
                 if lying.token.activity == 1:
@@ -103,7 +103,7 @@ class Sending(State):
         self.enqueue(line, token, sender)
 
     def enqueue(self, line: Line, token: Token[Any], sender: int) -> None:
-        """Give the token its number and its place in the queue; a full queue follows its policy (P5)."""
+        """Assign the token its number and its place in the queue; a full queue follows its policy (P5)."""
         line.sequence += 1
         token = _with(token, sequence=line.sequence)
         policy = line.edge.overflow
@@ -165,7 +165,7 @@ class Sending(State):
         self.send(owner, [(line, value, activity, stamp) for line in lines], flight)
 
     def is_automatic(self, owner: int, name: str) -> bool:
-        """Return whether nobody declared the event (A9)."""
+        """Return whether the event is automatic (A9)."""
         return is_box(owner) or (owner >= 0 and name not in self.stations[owner].type.events)
 
     def event_path(self, owner: int, name: str) -> str:
@@ -278,14 +278,14 @@ class Sending(State):
         return False
 
     def note_processed(self, line: Line) -> None:
-        """Say that a synchronous edge is free again, once a token was taken from it."""
+        """Say that a synchronous edge is free again, if a token was taken from it."""
         if line.edge.is_event:
             return
         if not line.slack or line.under_way == line.slack:
             self.observe(TokenProcessed(self.now, line.edge.label))
 
     def release_once(self) -> bool:
-        """What a sequential firing took is processed when what it put is (F5)."""
+        """Tokens taken by a sequential firing are processed when its own tokens are (F5)."""
         for station in self.stations:
             if (
                 station.owed
@@ -396,7 +396,7 @@ class Sending(State):
         raise NotImplementedError
 
     def note_places(self, *, gated: bool = False) -> None:
-        """Give a place to each node that has become enabled for a firing, and take it from those that are not (F9).
+        """Assign a place to each node that has become enabled for a firing, and take it from those that are not (F9).
 
         Args:
           gated: look only at those that a gate is set on.
@@ -432,7 +432,7 @@ class Sending(State):
                 self._make_operators(line)
 
     def renew_operators(self, station: Station) -> None:
-        """P9: when the node begins afresh, so do the operators behind its events that have completed."""
+        """P9: when the node starts over, so do the completed operators of its events."""
         for line in self.lines:
             if line.edge.source.owner == station.leaf.index and line.completed:
                 line.completed = False

@@ -59,7 +59,8 @@ class Line:
     def under_way(self) -> int:
         """How many tokens count against the slack.
 
-        What a consumer works on keeps the last relay of a buffer from passing on; behind a delay nobody waits for it.
+        A token that a consumer processes keeps the last relay of a buffer from forwarding; after a delay nothing waits
+        for it.
         """
         return len(self.queue) + (0 if self.delay else self.unprocessed)
 
@@ -71,7 +72,7 @@ class Line:
 
 @dataclass(eq=False)
 class Flight:
-    """A firing or slot call under way. `signals`: triggered in a thread, not at the loop yet."""
+    """A firing or slot call in progress. `signals`: triggered in a thread, not at the loop yet."""
 
     station: Station
     what: Literal["firing", "call"]
@@ -110,7 +111,7 @@ class Flight:
 
 @dataclass(eq=False)
 class Task:
-    """What a node's code has started beside its firings (X1); the `number` tells it from others of its node."""
+    """A task that a node's code has started (X1); the `number` tells it from others of its node."""
 
     station: Station
     name: str
@@ -169,7 +170,7 @@ class Station:
 
     @property
     def concurrency(self) -> int:
-        """How many of its firings may be under way at once (F14)."""
+        """How many of its firings may be in progress at once (F14)."""
         return int(self.leaf.options.concurrency)
 
     @property
@@ -179,44 +180,47 @@ class Station:
 
     @property
     def flight(self) -> Flight | None:
-        """What is under way; of several firings the one that began first."""
+        """The work in progress; of several firings the one that started first."""
         return self.flights[0] if self.flights else None
 
     @property
     def work(self) -> list[Flight | Task]:
-        """All of its code that is under way: firings, calls, tasks."""
+        """All of its running code: firings, calls, tasks."""
         return [*self.flights, *self.tasks]
 
     @property
     def firings_under_way(self) -> list[Flight]:
-        """Its firings under way, those that wait until their outputs may leave included (F14)."""
+        """Its firings in progress, including those that wait until their outputs may leave (F14)."""
         return [flight for flight in self.flights if flight.what == "firing"]
 
     @property
     def is_flying(self) -> bool:
-        """Whether code of a firing goes on; what is over and waits for its turn, or for its end, does not (F14)."""
+        """Whether code of a firing is running.
+
+        A finished firing that waits for its turn, or its end, does not count (F14).
+        """
         return any(flight.over is None and not flight.waits_to_end for flight in self.firings_under_way)
 
     @property
     def is_amid(self) -> bool:
-        """Whether it is amid a firing or call, so that it cannot be torn down."""
+        """Whether it is within a firing or call, so that it cannot be torn down."""
         return self.is_calling or self.is_flying
 
     @property
     def is_calling(self) -> bool:
-        """Whether a slot call is under way."""
+        """Whether a slot call is in progress."""
         return any(flight.what == "call" for flight in self.flights)
 
     @property
     def is_busy(self) -> bool:
-        """Whether no firing may begin, because of what is under way (F1, F14)."""
+        """Whether no firing may begin, because of work in progress (F1, F14)."""
         if not self.is_concurrent:
             return bool(self.flights) or bool(self.afterwards)  # its tasks come to their end first
         return self.is_calling or bool(self.afterwards) or len(self.firings_under_way) >= self.concurrency
 
     @property
     def is_restarting(self) -> bool:
-        """Whether a failure has it restarted, now or as soon as nothing of it goes on (X1)."""
+        """Whether a failure has it restarted, now or as soon as none of its code is running (X1)."""
         return self.resting_until is not None or self.afterwards == "rest"
 
     @property
@@ -375,7 +379,7 @@ class State:
     # --- activity
 
     def is_active(self, owner: int) -> bool:
-        """A(v); of a subgraph by G2: a node inside is active, or +1 is under way inside or was drained (F12)."""
+        """A(v); of a subgraph by G2: a node inside is active, or +1 is in transit inside or was drained (F12)."""
         if owner >= 0:
             return self.stations[owner].active
         if not is_box(owner):

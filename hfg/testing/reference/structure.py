@@ -1,8 +1,8 @@
-"""What a graph is made of once its subgraphs are dissolved, as plain data (rule G1).
+"""The contents of a graph with its subgraphs dissolved, as plain data (rule G1).
 
-Walks `graph.nodes` and `graph.edges` by itself: an edge that ends at a relay goes on with every edge that begins at the
-relay's other side, until it meets
-the port of a plain node, of an iterating subgraph, or of the root graph. Knows no rule but G1 and decides nothing.
+Walks `graph.nodes` and `graph.edges` by itself: an edge that ends at a relay continues with every edge that begins at
+the relay's other side, until it meets the port of a plain node, of an iterating subgraph, or of the root graph. Knows
+no rule but G1 and decides nothing.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ def dissolve(graph: Any, prefix: str = "", group: str = "loop") -> Structure:
 
 
 def whole(graph: Any) -> Structure:
-    """Dissolve a graph and lay what is inside iterating subgraphs beside the rest, with their boundaries as owners."""
+    """Dissolve a graph and put the insides of iterating subgraphs next to the rest, with their boundaries as owners."""
     result = dissolve(graph)
     waiting = [leaf for leaf in result.leaves if leaf.inside is not None]
     while waiting:
@@ -223,7 +223,7 @@ class _Dissolving:
         return outer.name in getattr(node._type, f"{outer.kind}s")
 
     def _behind(self, port: Any) -> Iterator[tuple[Any, int]]:
-        """Yield the edges that go on behind a relay."""
+        """Yield the edges that continue after a relay."""
         for level, depth in self.levels:
             for edge in level.edges:
                 source = edge.source

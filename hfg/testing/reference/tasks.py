@@ -1,4 +1,4 @@
-"""What the code of a node starts beside its firings by `start_soon`, and its do-activity (X1, X3, R5, F10, T5, A15).
+"""Tasks that the code of a node starts by `start_soon`, and its do-activity (X1, X3, R5, F10, T5, A15).
 
 A task is a child of its node: quiet waits for it, its errors are the node's, and it has ended before the node is torn
 down. Its steps are moves of their own, one task after another in the order in which they could go on.
@@ -85,7 +85,7 @@ class Tending(Firing):
             self.begin_to_do(station)
 
     def fail_task(self, task: Task, error: BaseException) -> None:
-        """X1: its node's policy decides, with nothing taken; a firing under way goes on."""
+        """X1: its node's policy decides, with nothing taken; a firing in progress continues."""
         station = task.station
         index = station.leaf.index
         if task.cancelled and self.is_enabled(index) and self.is_closing(station):
@@ -121,7 +121,7 @@ class Tending(Firing):
         self.begin_to_do(station)
 
     def activity_of(self, station: Station) -> Task | None:
-        """The do-activity that is under way; there is one at most."""
+        """The running do-activity; there is at most one."""
         return next((task for task in station.tasks if task.is_activity), None)
 
     def is_closing(self, station: Station) -> bool:

@@ -2,9 +2,9 @@
 
 Async node code runs in it one step at a time, in the machine's own time.
 
-Each firing or call that waits has an owner; its steps and timers are kept apart, so that whoever holds the machine
-decides which coroutine goes on next.
-Only what `asyncio.sleep`, futures, tasks and `asyncio.timeout` need is there: no sockets, no threads, no signals.
+Each firing or call that waits has an owner; its steps and timers are kept apart, so that the machine's owner decides
+which coroutine runs next. Only what `asyncio.sleep`, futures, tasks and `asyncio.timeout` need is there: no sockets, no
+threads, no signals.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
         """Nothing is counted: cancelled timers are skipped."""
 
     def call_exception_handler(self, context: dict[str, Any]) -> None:
-        """Say nothing: a coroutine that is thrown away at the end of a run is no fault."""
+        """Say nothing: a coroutine that is discarded at the end of a run is not an error."""
 
     # --- what the machine does with it
 

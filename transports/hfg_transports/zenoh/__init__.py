@@ -1,8 +1,8 @@
 """Zenoh as a transport of hfg: datagrams, presence and questions between processes and hosts.
 
-    settings    the settings file: realm, addresses, certificates, who may do what; every finding with its line
-    config      what Zenoh is told for them
-    opening     opens Zenoh's session, and says in a sentence why it cannot
+    settings    the settings file: realm, addresses, certificates, who may do what; every problem with its line
+    config      Zenoh's configuration for them
+    opening     opens Zenoh's session, and reports why it cannot
     keys        a secret that all programs have, as certificates
     diagnosing  finds out what Zenoh does not tell: why an address cannot be reached
     binding     the one module that imports Zenoh: its version, and what is marked unstable in it

@@ -1,6 +1,6 @@
 """Questions and answers: what asks waits on the loop, what answers runs as a task there.
 
-Stands on the inbox and sending.
+Depends on the inbox and sending.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _LONGEST_REFUSAL: Final = 2000
 
 
 class Question:
-    """One question that is under way: replies come from Zenoh's thread, the future lives on the loop."""
+    """One question in progress: replies come from Zenoh's thread, the future lives on the loop."""
 
     def __init__(self, name: str, loop: asyncio.AbstractEventLoop, mailbox: Mailbox[tuple[Question, Any]]) -> None:
         self.name = name
@@ -55,7 +55,7 @@ class Question:
             self._mailbox.leave((self, NoAnswer(f'nobody answers to "{self.name}"; is it running?')))
 
     def settle(self, result: bytes | Exception) -> None:
-        """Give whoever waits what has come; on the loop."""
+        """Deliver what has arrived to the waiting code; on the loop."""
         if self.future.done():
             return
         if isinstance(result, Exception):
@@ -89,7 +89,7 @@ class Answerer:
                 task.add_done_callback(self._tasks.discard)
 
     def close(self) -> None:
-        """Answer no more; what is under way is cancelled."""
+        """Stop answering; answers in progress are cancelled."""
         self._closed = True
         for task in self._tasks:
             task.cancel()
@@ -137,6 +137,9 @@ class Answerer:
 
 
 def _drop(query: zenoh.Query) -> None:
-    """Tell Zenoh that a query is done with: who asks waits for that, and Python's collector comes when it likes."""
+    """Tell Zenoh that a query is finished.
+
+    The caller waits for this, and Python's garbage collector may run much later.
+    """
     with contextlib.suppress(Exception):
         query.drop()

@@ -1,7 +1,7 @@
 """The one module that imports Zenoh: which version there is, and everything that is marked unstable in it.
 
-Zenoh is an extra of hfg, so it is imported when the first session is opened. What other modules touch of it are its
-stable classes; `Callback(indirect=...)` and the links of a session are not stable, and wrapped here. Stands on errors.
+Zenoh is an extra of hfg, so it is imported when the first session is opened. Other modules use only its stable classes;
+`Callback(indirect=...)` and the links of a session are not stable, and wrapped here. Depends on errors.
 """
 
 from __future__ import annotations
@@ -86,5 +86,5 @@ def network_callback(function: Callable[[Any], None], finished: Callable[[], Non
 
 
 def connections(session: zenoh.Session) -> list[Connection]:
-    """Give the links that a session has now."""
+    """Return the links that a session has now."""
     return [Connection(str(link.zid), link.dst, link.auth_identifier) for link in session.info.links()]

@@ -1,6 +1,6 @@
-"""What Zenoh is told for the settings: each key of its configuration that is not as it comes.
+"""Zenoh's configuration for the settings: each key that differs from its default.
 
-Plain data, so it can be looked at without Zenoh. Why each is as it is stands beside it. Stands on settings and names.
+Plain data, so it can be looked at without Zenoh. Each has a comment with the reason. Depends on settings and names.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _ROOM: Final = 64 * 1024
 
 
 def configuration(settings: Settings, mode: Mode, *, wait_s: float) -> dict[str, Any]:
-    """Give what is said to Zenoh, by key.
+    """Return Zenoh's configuration, by key.
 
     Args:
       settings: checked ones.
@@ -91,7 +91,7 @@ _PRIORITIES: Final = (
 
 
 def listens(settings: Settings, mode: Mode) -> list[str]:
-    """Give the addresses at which a session listens."""
+    """Return the addresses at which a session listens."""
     if mode == "router":
         return list(settings.listen)
     if mode == "peer" and _is_among_peers(settings):
@@ -100,10 +100,12 @@ def listens(settings: Settings, mode: Mode) -> list[str]:
 
 
 def _is_among_peers(settings: Settings) -> bool:
-    """Whether there is an address at which peers listen. All others speak through agents, which see to who may do what.
+    """Whether there is an address at which peers listen.
 
-    With certificates connections among peers would pass by the agent, and so by its access control; and where that is
-    on another host, none can be made to those behind it.
+    All others communicate through agents, which enforce permissions.
+
+    With certificates connections among peers would pass by the agent, and so by its access control; and if the agent is
+    on another host, peers behind it cannot be reached.
     """
     return bool(settings.meet) and settings.tls is None and not _is_elsewhere(settings.connect)
 
@@ -117,7 +119,7 @@ def _beside(address: str) -> str:
 
 
 def targets(settings: Settings, mode: Mode) -> list[str]:
-    """Give the addresses to which a session connects."""
+    """Return the addresses to which a session connects."""
     if mode == "router":
         return list(settings.agents)
     if settings.connect:
@@ -161,9 +163,9 @@ _ALL_MESSAGES: Final = (
 
 
 def _access_control(access: Access, keys: Keys) -> dict[str, Any]:
-    """Nothing but what is said here; Zenoh tells nobody when it refuses.
+    """Only the rules listed here apply; Zenoh does not report refusals.
 
-    A question does not carry the name of who asks, so the key says what may be asked for: its last two chunks, for a
+    A question does not carry the caller's name, so the key states what may be requested: its last two chunks, for a
     rule that looked for "ro" anywhere would let a viewer steer a worker that is called "ro".
     """
     everything = [f"{keys.data}/**", f"{keys.questions}/**", f"{keys.presences}/**", f"{keys.versions}/**"]

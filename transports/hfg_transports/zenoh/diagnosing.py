@@ -1,8 +1,8 @@
 """Finds out what Zenoh does not tell: why an address cannot be reached.
 
-Whatever the reason, Zenoh says "Unable to connect ... Timeout!" for nobody listening, for a host without a name, and
-for every certificate that does not fit. So after the failure the same way is tried once more with Python's own TLS,
-which knows the reason, on both ends: the other one says by an alert what it dislikes. Depends on settings and keys.
+Whatever the reason, Zenoh says "Unable to connect ... Timeout!" for a missing listener, for an unknown host, and for
+every certificate that does not fit. So after the failure the same way is tried once more with Python's own TLS, which
+knows the reason, on both ends: the other one says by an alert what it dislikes. Depends on settings and keys.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def _handshake(connection: socket.socket, host: str, tls: Tls) -> Reason:
 
 
 def _handshake_with_key(connection: socket.socket, key: str) -> Reason:
-    """Say what is wrong with whoever listens; proving that we have the key, too, is not needed for that."""
+    """Return what is wrong with the listener; this does not require proving that we have the key."""
     connection.settimeout(_PATIENCE_S)
     context = ssl.create_default_context(cadata=authority_of_key(key))
     context.check_hostname = False

@@ -1,9 +1,9 @@
 """Closes the sessions that a program leaves open when it ends, so that it does end.
 
 Zenoh's callbacks run in threads for which Python waits at the end, and which end with their session. A program that
-leaves by an exception, or forgets, would stay for ever. Python runs `atexit` after that waiting, too late for it; a
-thread that waits for the main thread comes in time. No thread here is a daemon: one that comes back from Zenoh while
-Python is being taken down aborts the process ("FATAL: exception not rethrown"). Stands on nothing.
+leaves by an exception, or forgets, would never exit. Python runs `atexit` after that waiting, too late for it; a thread
+that waits for the main thread comes in time. No thread here is a daemon: one that comes back from Zenoh while Python is
+being taken down aborts the process ("FATAL: exception not rethrown"). No dependencies.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 What costs is not the message but waking the loop: 48,000 messages a second with a wake-up each, over a million with one
 for all that has come meanwhile. So threads leave what they have in a mailbox, and the first to do so since the loop
 last looked rings for it. Bounded: what a loop that hangs does not fetch is dropped and counted, which a transport may.
-Stands on errors and logs.
+Depends on errors and logs.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Inbox:
             self._closed = True
 
     def close(self) -> None:
-        """Call nobody any more."""
+        """Make no more callbacks."""
         self._closed = True
         self._filled.clear()
 
@@ -123,7 +123,7 @@ class Mailbox(Generic[_Item]):
             self._inbox.ring(self)  # type: ignore[arg-type] # the inbox looks at none of its items
 
     def deliver(self) -> None:
-        """Give the receiver what lies there; on the loop."""
+        """Deliver queued messages to the receiver; on the loop."""
         self._listed = False  # before looking, as with the inbox's own flag
         fetch = self._items.popleft
         taken = [fetch() for _ in range(len(self._items))]

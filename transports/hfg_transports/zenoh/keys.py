@@ -1,9 +1,9 @@
 """A key that all programs of a realm have, as certificates: both ends of a connection prove that they have it.
 
 The key makes an authority, the same one wherever the key is. Each session has a certificate of its own, signed by that
-authority, and trusts nobody else. So TLS does what it does with certificates from files: both ends prove who they are,
-and what is sent is encrypted, authenticated and cannot be replayed. Whoever has the key can do everything.
-Stands on the package cryptography, of the extra zenoh.
+authority, and trusts no other. So TLS does what it does with certificates from files: both ends prove who they are, and
+what is sent is encrypted, authenticated and cannot be replayed. The owner of the key can do everything. Depends on the
+package cryptography, of the extra zenoh.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def authority_of_key(file: str) -> str:
 
 
 def tls_of_key(file: str) -> dict[str, Any]:
-    """Return what Zenoh is told about TLS for a key.
+    """Return Zenoh's TLS configuration for a key.
 
     Raises:
       TransportError: the key cannot be used, or cryptography is not installed.

@@ -1,9 +1,9 @@
 """Keys and names of hfg as Zenoh's key expressions, and back.
 
-Zenoh gives a meaning to `* $ # ?`, and to chunks that begin with `@`: a wildcard never matches those, which keeps what
-is said about a system (`@hfg/...`) apart from its data. So each chunk is percent-encoded where it has one of these.
-Everything of hfg lies below the version of its wire format and the realm: programs of two realms, or of two versions,
-do not hear each other. Stands on errors.
+Zenoh gives a meaning to `* $ # ?`, and to chunks that begin with `@`: a wildcard never matches those, which keeps data
+about a system (`@hfg/...`) apart from its data. So each chunk is percent-encoded where it has one of these. Everything
+of hfg lies below the version of its wire format and the realm: programs of two realms, or of two versions, do not hear
+each other. Depends on errors.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _FORBIDDEN: Final = re.compile("[*$#?%@\x00-\x1f\x7f\ud800-\udfff]")
 
 
 def escape(name: str) -> str:
-    """Give a name whose chunks Zenoh takes as they are.
+    """Return a name whose chunks Zenoh takes as they are.
 
     Raises:
       TransportError: it has an empty chunk.
@@ -41,7 +41,7 @@ def escape(name: str) -> str:
 
 
 def unescape(key: str) -> str:
-    """Give back the name that was escaped.
+    """Return the name that was escaped.
 
     Examples:
       >>> unescape("arm/what%3F")

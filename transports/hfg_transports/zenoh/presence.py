@@ -1,8 +1,8 @@
-"""Who is there: announcements and watches, over Zenoh's liveliness tokens.
+"""Presence: announcements and watches, over Zenoh's liveliness tokens.
 
 A token is a key and nothing else, so what is announced with a name stands in the key. So does the session with a
 number, since two sessions that announce one name are two: `<session>.<number>/<metadata>/<name ...>`. The name comes
-last, for a wildcard of many chunks covers only what has no `@` in front. Stands on names and the inbox.
+last because a wildcard of many chunks matches only chunks without a leading `@`. Depends on names and the inbox.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _NOTHING: Final = "-"
 
 
 def presence_key(prefix: str, session: str, number: int, name: str, metadata: bytes) -> str:
-    """Give the key of a token.
+    """Return the key of a token.
 
     Raises:
       MessageTooLarge: name and metadata do not fit into one.
@@ -38,12 +38,12 @@ def presence_key(prefix: str, session: str, number: int, name: str, metadata: by
 
 
 def prefix_key(prefix: str, name: str) -> str:
-    """Give what matches the tokens of all names at or below a name."""
+    """Return what matches the tokens of all names at or below a name."""
     return join(prefix, "*", "*", *([escape(name)] if name else []), "**")
 
 
 def read_presence_key(prefix: str, key: str) -> tuple[str, str, bytes] | None:
-    """Give token, name and metadata of a key; None if it is none of ours."""
+    """Return token, name and metadata of a key; None if it is not one of ours."""
     token, _, rest = key.removeprefix(f"{prefix}/").partition("/")
     said, _, name = rest.partition("/")
     if not key.startswith(prefix) or not (token and said and name):
@@ -69,7 +69,7 @@ class Announcement:
 
 
 class Watching:
-    """What one watch has been told of.
+    """The names reported to one watch.
 
     Zenoh may tell of a token twice, by two ways or after a reconnection, and of the end of one that it never told of.
     """

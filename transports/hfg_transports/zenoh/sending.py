@@ -2,8 +2,8 @@
 
 A put that finds no room is dropped by Zenoh, never waited for: the links repair loss, and Zenoh's blocking kind stands
 still for seconds and then loses the message all the same. Even a dropping put of a few megabytes may take fifty
-milliseconds, though, so what is longer than `LONG` goes through a thread; what the same publisher puts meanwhile goes
-behind it. Stands on config and binding.
+milliseconds, though, so longer datagrams go through a thread; later datagrams of the same publisher queue after them.
+Depends on config and binding.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ class ZenohPublisher:
 
     @property
     def wanted(self) -> bool:
-        """Whether anybody has subscribed to the key, as far as this session has heard."""
+        """Whether the key has a subscriber, as far as this session knows."""
         return not self._closed and bool(self._publisher.matching_status)
 
     def put(self, header: bytes, payload: Buffer = b"") -> None:
@@ -163,7 +163,7 @@ class ZenohPublisher:
 
 
 def quality(library: Any, traffic: Traffic) -> dict[str, Any]:
-    """Give how Zenoh sends a kind of traffic.
+    """Return how Zenoh sends a kind of traffic.
 
     Order holds within one priority only, so each kind has one. Express: sent without waiting for others to share a
     batch, which halves the delay and the throughput.

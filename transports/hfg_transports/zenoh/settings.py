@@ -10,15 +10,14 @@ A TOML file of which every key may be left out. What is wrong is found all at on
 
     [tls]
     authority = "keys/authority.pem"         # paths are seen from the folder of the settings
-    certificate = "keys/arm.pem"
-    key = "keys/arm.key"
+    certificate = "keys/arm.pem" key = "keys/arm.key"
 
     [access]
     write = ["arm", "base"]                  # names in certificates: may do everything
     read = ["viewer"]                        # may look: values, who is there, and questions "…/ro/<verb>"
 
 Instead of [tls], key = "cell.key" names a file with a secret that all programs have. Without an address nothing listens
-and nothing leaves this computer. Stands on errors and problems; knows nothing of Zenoh.
+and nothing leaves this computer. Depends on errors and problems; does not depend on Zenoh.
 """
 
 from __future__ import annotations
@@ -62,7 +61,7 @@ class Tls(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Certificates.
 
     Attributes:
-      authority: the certificate of whoever has signed all others; a file.
+      authority: the certificate of the authority that has signed all others; a file.
       certificate: of this program; a file.
       key: to it; a file.
       mutual: whether those who connect have to show a certificate too.
@@ -75,7 +74,7 @@ class Tls(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class Access(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Who may do what, by the common name of the certificate; the agents refuse everybody else.
+    """Permissions, by the common name of the certificate; the agents refuse all other programs.
 
     Attributes:
       write: may do everything.
@@ -87,25 +86,26 @@ class Access(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What all programs of a system are told about the network; see the module.
+    """The network settings of all programs of a system; see the module.
 
     Attributes:
       realm: who hears whom.
       host: what this computer is called.
       listen: where its agent is reached.
       agents: where those of other hosts are.
-      connect: where everybody else connects to; empty: to `listen`.
+      connect: addresses that all other programs connect to; empty: to `listen`.
       meet: where programs meet without an agent; the first listens there, and the others at a free port of the same
         address. Rarely needed: programs of one user on one computer meet without any address.
       key: a file with a secret that all programs of the realm have, by which both ends prove who they are and which
         encrypts what is sent; "" for none.
       tls: certificates, instead of a key.
       access: who may do what; None: everybody everything.
-      insecure: whether there may be addresses without TLS: anybody who can connect there can run code as this user.
+      insecure: whether there may be addresses without TLS: any program that can connect there can run code as this
+        user.
       largest_message: bytes of header and payload that are sent and received at most.
-      lease_s: after how many seconds of silence somebody counts as gone.
-      shared_memory: bytes that long messages between programs of one host go through; 0: none. What a killed program
-        leaves of it in /dev/shm stays there.
+      lease_s: after how many seconds of silence a program counts as gone.
+      shared_memory: bytes that long messages between programs of one host go through; 0: none. Segments that a killed
+        program leaves in /dev/shm stay there.
     """
 
     realm: str = "default"

@@ -1,8 +1,8 @@
-"""The contract of `hfg.transport` over Zenoh: sessions, composed of what stands beside this.
+"""The contract of `hfg.transport` over Zenoh: sessions, composed from the modules of this package.
 
-All methods are called on one event loop and call back there. Opening and closing Zenoh's session block, and closing
-for ten seconds if somebody stands still who was being sent to; so both have a thread, and closing is not waited for
-longer than `CLOSE_S`. Stands on everything else here.
+All methods are called on one event loop and call back there. Opening and closing Zenoh's session block, and closing may
+block for ten seconds if a receiver has stopped responding; so both have a thread, and closing is not waited for longer
+than `CLOSE_S`. Depends on everything else here.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class ZenohTransport:
 
 
 async def _chosen(settings: Settings | Path | str | None, fields: dict[str, Any]) -> Settings:
-    """Return settings, read from their file if need be, with some fields replaced."""
+    """Return settings, read from their file if needed, with some fields replaced."""
     if settings is None or isinstance(settings, Settings):
         chosen = settings or Settings()
     else:
@@ -133,7 +133,7 @@ def _open(settings: Settings, mode: Mode, wait_s: float) -> Callable[[asyncio.Ab
 async def _in_thread(
     work: Callable[[], Callable[[asyncio.AbstractEventLoop], ZenohSession]], loop: asyncio.AbstractEventLoop
 ) -> ZenohSession:
-    """Wait for a session that a thread opens; one that nobody waits for any more is closed again."""
+    """Wait for a session that a thread opens; one that is no longer awaited is closed."""
     opened = asyncio.ensure_future(asyncio.to_thread(work))
     try:
         return (await asyncio.shield(opened))(loop)
@@ -188,7 +188,7 @@ class ZenohSession:
 
     @property
     def host(self) -> str:
-        """What this computer is called, as the settings say."""
+        """The name of this computer, according to the settings."""
         return self.settings.host
 
     @property
@@ -212,7 +212,7 @@ class ZenohSession:
         return self._refused
 
     def connections(self) -> list[binding.Connection]:
-        """Give the links to other sessions, with the names in their certificates."""
+        """Return the links to other sessions, with the names in their certificates."""
         return [] if self._closing is not None else binding.connections(self._raw)
 
     # --- datagrams ---
@@ -246,7 +246,7 @@ class ZenohSession:
     # --- presence ---
 
     def announce(self, name: str, metadata: bytes = b"") -> Announcement:
-        """Say that somebody is here; see `hfg.transport.Session.announce`."""
+        """Announce a name; see `hfg.transport.Session.announce`."""
         self._check_open()
         if name in self._announced:
             raise TransportError(f'"{name}" is announced by this session already; take another name')
@@ -342,7 +342,7 @@ class ZenohSession:
     def close_raw(self) -> None:
         """Close Zenoh's session, from any thread; blocks.
 
-        Zenoh raises when somebody has stood still for ten seconds to whom something was to be sent: nobody's error.
+        Zenoh raises if a receiver has not responded for ten seconds; this is not an error of the sender.
         """
         self._sender.close(CLOSE_S / 2)
         with contextlib.suppress(Exception):

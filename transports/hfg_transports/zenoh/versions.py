@@ -1,7 +1,7 @@
-"""Who else is in the realm, and whether it speaks the same: programs of two versions do not hear each other.
+"""Other programs in the realm, and their versions: programs of different versions cannot communicate.
 
-Each session leaves a token with its version where all versions look. Who comes last is refused; who was there before
-logs a warning. Stands on names.
+Each session leaves a token with its version where all versions look. The last to come is refused; those that were there
+before log a warning. Depends on names.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ __all__ = ["complaint", "version_key"]
 
 
 def version_key(keys: Keys, session: str) -> str:
-    """Give the key of the token by which a session says what it speaks."""
+    """Return the key of the token by which a session says what it speaks."""
     return f"{keys.versions}/{WIRE_VERSION}/{escape(importlib.metadata.version('hfg'))}/{session}"
 
 
 def complaint(keys: Keys, key: str, realm: str) -> str | None:
-    """Say in a sentence that the session of another token speaks otherwise; None if it speaks the same."""
+    """Return an error message if the session of another token uses another version; None if it is the same."""
     wire, _, rest = key.removeprefix(f"{keys.versions}/").partition("/")
     if wire == str(WIRE_VERSION) or not key.startswith(keys.versions):
         return None
