@@ -16,7 +16,7 @@ TAKES_S = 0.08
 
 
 async def request(number: int) -> int:
-    """Wait for somebody else."""
+    """Wait for another one."""
     await asyncio.sleep(TAKES_S)
     return number
 

@@ -5,7 +5,7 @@ Measured: letters of 100 bytes and pictures of 6.2 megabytes, once as fast as it
   and what is too many is lost and counted. Besides: activity over an edge that is cut, and the graph of
   examples/three_processes.py cut and in one piece.
 Everybody sends the same bytes from one process, and has them in the other, pictures as an array there; start-up and the
-  first tenth are not counted. Who is not installed is named and skipped.
+  first tenth are not counted. Packages that are not installed are named and skipped.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The live table of `hfg run`: what watching costs.
 
 Measured: CPU time of the process, in percent of one core, that a run on the real clock takes more with the table than
-  without, in the same process one after the other. The graph: chains of ten functions, ten tokens a second each. The
+  without, in the same process one after the other. The graph: chains of ten functions, ten tokens per second each. The
   table is drawn four times a second on a terminal of 120 columns and 50 rows, and includes the measuring of the nodes'
   code that it asks for.
 Not measured: the terminal that shows it.
@@ -32,7 +32,7 @@ SECONDS_A_NODE = 0.02  # ten seconds for 500
 
 @contextmanager
 def terminal(columns: int = 120, rows: int = 50) -> Iterator[Foot]:
-    """Open a terminal that somebody else reads."""
+    """Open a terminal that another process reads."""
     reading, writing = os.openpty()
     fcntl.ioctl(writing, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
     with subprocess.Popen(["cat"], stdin=reading, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as reader:

@@ -44,7 +44,7 @@ class Late:
 
 
 def peer(name: str, module: str, *works: str) -> Row:
-    """A row of somebody else."""
+    """A row of another framework."""
     return Row(name, Late(module, name), *works)
 
 

@@ -1,4 +1,4 @@
-"""What recording costs: ten ports of a chain, 10,000 tokens a second all together, with a recording and without.
+"""The cost of recording: ten ports of a chain, 10,000 tokens per second in total, with a recording and without.
 
 Measured: the processor time of the whole process, the writing thread included, over the same second of the graph's
 life, and of the graph's own thread; pairs of runs in turn, in one process, and the median of the pairs' ratios, so that

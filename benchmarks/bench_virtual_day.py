@@ -21,7 +21,7 @@ RATE_HZ = 10
 
 
 def day(seconds: int) -> float:
-    """Run it for so many seconds of virtual time."""
+    """Run it for `seconds` of virtual time."""
     graph = hfg.Graph("day")
     meter = Arrivals(RATE_HZ * seconds)
     port = graph.add(numbers(count=RATE_HZ * (seconds + 1)), max_rate_hz=RATE_HZ).out

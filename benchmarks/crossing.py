@@ -219,26 +219,26 @@ class Here(hfg.Node):
 
     @hfg.slot
     def begin(self) -> None:
-        """Give it away for the first time."""
+        """Release it for the first time."""
         Here.meter.lap()
         self.away.trigger(Here.meter.tokens - 1)
 
     @hfg.slot
     def back(self, left: int) -> None:
-        """Give it away again."""
+        """Release it again."""
         Here.meter.lap()
         if left:
             self.away.trigger(left - 1)
 
 
 class There(hfg.Node):
-    """Gives it back."""
+    """Returns it."""
 
     away = hfg.Event(int)
 
     @hfg.slot
     def take(self, left: int) -> None:
-        """Give it back."""
+        """Return it."""
         self.away.trigger(left)
 
 

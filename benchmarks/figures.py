@@ -38,7 +38,7 @@ def measured_on(record: Record) -> str:
 
 
 def caption(records: Records) -> str:
-    """What the figures were measured on, and how far to trust them."""
+    """The machine and versions of the measurement, and how far to trust the figures."""
     several = list(records.values())
     first = several[0]
     spreads = sorted(record.spread for record in several)

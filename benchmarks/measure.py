@@ -174,7 +174,7 @@ def use(checkout: Path) -> None:
 
 
 def machine() -> str:
-    """What the figures were measured on."""
+    """The machine and versions of the measurement."""
     cores = os.cpu_count()
     return f"{platform.system()} {platform.machine()}, {processor()}, {cores} cores, Python {platform.python_version()}"
 

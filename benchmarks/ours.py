@@ -49,7 +49,7 @@ def end(meter: Arrivals | None = None) -> End:
 
 
 def run(graph: hfg.Graph) -> hfg.Report:
-    """Run it to its end; nobody observes."""
+    """Run it to its end, without observers."""
     return hfg.run(graph)
 
 
@@ -63,7 +63,7 @@ class Kind(Participant):
         self.events = makes[0] is Relay or makes[0] is Starter
 
     def line(self, graph: hfg.Graph, port: Any, length: int, *, active: bool = False) -> Any:
-        """Put `length` nodes behind the port; the last one's port."""
+        """Add `length` nodes after the port; return the last one's port."""
         for position in range(length):
             node = graph.add(self.makes[position % len(self.makes)]())
             graph.connect(port, entry(node), active=active)
@@ -86,7 +86,7 @@ class Kind(Participant):
     def flight(self, length: int, tokens: int) -> dict[str, float]:
         """B: microseconds a hop, one token in flight.
 
-        Data waits by itself: the source fires again when everything behind it is over (F5). Of signals one goes round.
+        Data waits by itself: the source fires again when everything after it is over (F5). Of signals one goes round.
         """
         meter = Laps(tokens)
         graph = hfg.Graph("flight")

@@ -1,8 +1,8 @@
 """Make the tables of docs/speed.md from the lines that the benchmarks wrote: `python -m benchmarks.page [FOLDER]`.
 
 The lines of the suites found in the folder replace those in docs/speed.jsonl, which stands beside the page as its
-source; then everything between `<!-- NAME -->` and `<!-- end -->` is written anew. Prose is left alone, so it names no
-figure of its own.
+source; then everything between `<!-- NAME -->` and `<!-- end -->` is written anew. Prose is not changed, so it must not
+contain figures.
 """
 
 from __future__ import annotations
@@ -204,7 +204,7 @@ TABLES: dict[str, tuple[str, Callable[[Records], str]]] = {
 
 
 def render(page: str, suites: Mapping[str, Records]) -> str:
-    """The page with its tables made anew; one whose suite was not measured stays as it is."""
+    """Return the page with new tables; a table whose suite was not measured is unchanged."""
 
     def block(match: re.Match[str]) -> str:
         suite, write = TABLES[match["name"]]

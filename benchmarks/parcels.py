@@ -28,7 +28,7 @@ Picture = npt.NDArray[np.uint8]
 
 
 class Job(NamedTuple):
-    """What one pair of processes does.
+    """The work of one pair of processes.
 
     Attributes:
       what: is sent.
@@ -48,7 +48,7 @@ class Job(NamedTuple):
         return max(1, self.number // 10)
 
     def numbers(self) -> Iterator[int]:
-        """Count at the rate, by an absolute schedule, for whoever may stand still meanwhile."""
+        """Count at the rate, by an absolute schedule, even if the caller blocks meanwhile."""
         began = time.monotonic()
         for number in range(self.number):
             if self.rate_hz:
@@ -72,7 +72,7 @@ def opened(letter: Any) -> tuple[int, int]:
 
 @functools.cache
 def picture_bytes() -> bytes:
-    """The picture for who sends bytes: it needs no copy to have them."""
+    """The picture for senders of bytes: it has them without a copy."""
     return np.random.default_rng(1).integers(0, 255, SHAPE, dtype=np.uint8).tobytes()
 
 

@@ -1,11 +1,11 @@
-"""Each question goes to two servers at once; one breaks now and then, the other may be too slow, and the graph goes on.
+"""Each question goes to two servers at once; one breaks now and then, the other may be slow, and the graph continues.
 
     questions ─┬─ ask near ─┬─ compare
                └─ ask far ──┘                 failed ──> note
 
 Shown: async functions as nodes, a time limit (`max_duration_s`), errors that cost one answer and not the run
-(`on_error="skip"`), the event `failed` of every node, and optional inputs. In virtual time it takes no time.
-Run it with `python examples/async_requests.py` or `hfg run examples/async_requests.py --clock virtual`.
+(`on_error="skip"`), the event `failed` of every node, and optional inputs. In virtual time it takes no time. Run it
+with `python examples/async_requests.py` or `hfg run examples/async_requests.py --clock virtual`.
 """
 
 from __future__ import annotations

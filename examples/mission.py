@@ -58,7 +58,7 @@ class Equals(Step):
 
 
 class Tour(Step):
-    """Gives one goal after the other."""
+    """Sends one goal after the other."""
 
     goal = hfg.Event(Point)
     over = hfg.Event()
@@ -75,7 +75,7 @@ class Tour(Step):
 
 
 class Tries(Step):
-    """Lets something be tried again, but not for ever."""
+    """Lets something be tried again, but not forever."""
 
     go = hfg.Event(Point)
     gave_up = hfg.Event()
@@ -149,7 +149,7 @@ class ReadNumber(Step):
 
 
 class WaitForCube(Step):
-    """Waits until somebody has put a cube into the basket, or has taken it."""
+    """Waits until a cube was put into the basket, or taken from it."""
 
     number = hfg.Input(int)
     done = hfg.Event()

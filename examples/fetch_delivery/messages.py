@@ -19,7 +19,7 @@ Picture: TypeAlias = NDArray[np.uint8]
 
 
 class Twist(NamedTuple):
-    """A velocity in the robot's frame: what it shall do, or does."""
+    """A velocity in the robot's frame: the commanded or the actual one."""
 
     vx: float = 0.0
     vy: float = 0.0

@@ -129,7 +129,7 @@ class Clicks(hfg.Node):
 class Buffer(hfg.Node):
     """A translation node of SDF+: takes signals by a slot and gives them as data; full, it forgets the oldest.
 
-    It is a source, so nobody but its own code can say when it has ended.
+    It is a source, so only its own code can tell when it has ended.
     """
 
     out = hfg.Output(int)

@@ -205,7 +205,7 @@ def target_detection() -> Iterator[Pose]:
 
 @hfg.node
 def cube_detection(*, seen: tuple[int, ...] = (0,) * 4 + (3,) * 8 + (0,) * 4) -> Iterator[int]:
-    """Read the number on the cube in the basket, once a second."""
+    """Read the number on the cube in the basket, once per second."""
     yield from seen
 
 

@@ -30,7 +30,7 @@ def show(value: int) -> None:
 
 
 def build(count: int = 200, rate_hz: float = 50.0) -> hfg.Graph:
-    """Make the graph; the numbers go out at so many a second."""
+    """Make the graph; `rate_hz` numbers are sent per second."""
     graph = hfg.Graph("robot")
     graph.group("grasping", host="arm")
     source = graph.add(numbers(count=count), max_rate_hz=rate_hz)

@@ -35,7 +35,7 @@ def photograph() -> Iterator[Gray]:
 
 
 class Coins(NamedTuple):
-    """What was found, from the largest coin to the smallest.
+    """The coins, from the largest to the smallest.
 
     Attributes:
       outlines: of each, in pixels.

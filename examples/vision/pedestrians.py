@@ -49,7 +49,7 @@ class Street(VideoFile):
       rate: "file" as the video says, "fast" as fast as pictures are taken.
       start: the number of the first picture, from 0.
       end_before: the number of the picture before which it stops; None for the whole video.
-      loop: begin again after the last picture, without end.
+      loop: start over after the last picture, endlessly.
       image: the picture: blue, green, red.
       number: the number of the picture, from 0.
       near: whether people fill the picture.

@@ -29,7 +29,7 @@ FOCAL_PX, BASELINE_M, SHIFT_PX = 994.978, 0.193001, 31.086
 
 
 class Pair(NamedTuple):
-    """Two pictures of the same moment, rectified, and the true disparities in pixels: NaN where nobody knows."""
+    """Two pictures of the same moment, rectified, and the true disparities in pixels: NaN where unknown."""
 
     left: Color
     right: Color

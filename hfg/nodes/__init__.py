@@ -1,6 +1,7 @@
-"""The standard library of nodes: one family a module, written on floors 0-3 as a user would write it.
+"""The standard library of nodes: one family per module, written on the lower layers as a user would.
 
-    import hfg from hfg.nodes import flow
+    import hfg
+    from hfg.nodes import flow
 
     graph.add(flow.delay(seconds=0.5))
 

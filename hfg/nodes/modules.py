@@ -4,7 +4,9 @@ Arguments that are arrays are inputs, and so are required arguments without a de
 or declared as a number, a string or a choice, are parameters. Types that the signature lacks are read from the
 docstring, in the form of numpy or Google.
 
-    # my_robot/filters.py import scipy.ndimage from hfg.nodes import from_module
+    # my_robot/filters.py
+    import scipy.ndimage
+    from hfg.nodes import from_module
 
     filters = from_module(scipy.ndimage)
 

@@ -49,7 +49,7 @@ class Move:
 
 @dataclass
 class GoTo:
-    """Go to a pose of the map; plan anew while the robot and others move.
+    """Go to a pose of the map; replan while the robot and others move.
 
     Attributes:
       goal: the pose.

@@ -33,7 +33,7 @@ _BEFORE_M: Final = 1.25  # a station, from where its sign is looked for
 
 @dataclass
 class Senses:
-    """What the robot knows at a tick.
+    """The robot's knowledge at a tick.
 
     Attributes:
       message: what the referee says.
@@ -66,11 +66,11 @@ class Senses:
 
 @dataclass
 class Orders:
-    """What shall be done at a tick.
+    """The actions of a tick.
 
     Attributes:
       command: the velocity.
-      lamp: whether the lamp shall be switched, and to what.
+      lamp: whether to switch the lamp, and to what.
       look_ahead: whether a picture of what is ahead shall be taken.
       look_into_basket: whether one of the basket shall be.
       ask: whether to begin anew with looking what lies in the basket.
@@ -272,7 +272,7 @@ class Mission:
         return "done" if self.senses.message == "start" else None
 
     def _select(self) -> str | None:
-        """Choose a filling station: near, nobody there, and not one where it has just failed.
+        """Choose a filling station: near, free, and not one where it has just failed.
 
         As long as no filling station is known, each side of the octagon may be one.
         """
@@ -410,7 +410,7 @@ class Mission:
         self.orders.lamp = False
 
     def ask_for_basket(self) -> None:
-        """Look anew what lies in the basket."""
+        """Check again what is in the basket."""
         self.orders.ask = True
 
     def bear_a_grudge(self) -> None:
@@ -443,7 +443,7 @@ class Mission:
         return self._number in self.senses.signs
 
     def begin_to_explore(self) -> None:
-        """Count the views anew if another sign is looked for."""
+        """Restart the count of views if another sign is looked for."""
         if self._number != self._wanted:
             self._wanted, self._views = self._number, 0
 

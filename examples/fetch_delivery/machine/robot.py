@@ -28,10 +28,10 @@ class Control(hfg.Node):
       localised: where the robot is.
       others: other robots.
       command: velocities.
-      lamp: whether the lamp shall be on.
+      lamp: whether the lamp should be on.
       look_ahead: asks for a picture of what is ahead.
       look_into_basket: asks for one of the basket.
-      ask: asks the cube detection to look anew.
+      ask: asks the cube detection to look again.
       forget: the number of a sign that is not where it should be.
       report: the number of a cube that cannot be delivered.
       entered: the state that was entered.
@@ -118,7 +118,7 @@ class Robot(robot.Robot):
     """The same robot with another mind."""
 
     def build(self, graph: hfg.Graph) -> None:
-        """Put control behind perception."""
+        """Connect control to perception."""
         perception, control = graph.add(robot.Perception(), name="perception"), graph.add(Control(), name="control")
         self.begin.inner.activates(control.begin)
         for name in ("odometry", "scan", "front", "basket"):

@@ -232,7 +232,7 @@ class LookAround(hfg.Subgraph):
     done = hfg.Event()
 
     def build(self, graph: hfg.Graph) -> None:
-        """Put a shutter beside the turn."""
+        """Add a shutter to the turn."""
         turn = graph.add(MoveRobot(turn=2 * math.pi), name="turn", active_for_s=15.1)
         shutter = graph.add(Shutter(n=3), name="shutter")
         self.begin.inner.activates(turn.begin)

@@ -23,7 +23,7 @@ from hfg.nodes.robotics import Disk
 
 
 class SelectFilling(hfg.Node):
-    """Choose a filling station: near, nobody there, and not one where it has just failed.
+    """Choose a filling station: near, free, and not one where it has just failed.
 
     As long as no filling station is known, each side of the octagon may be one.
 
@@ -207,7 +207,7 @@ class NextView(hfg.Node):
       goal: the pose.
       gave_up: nothing was found.
       begin: the number that is looked for; where activity arrives.
-      found: something was found, so counting begins anew.
+      found: something was found, so counting starts over.
     """
 
     radius = hfg.Parameter(4.0, Gt(0), unit="m")
@@ -240,7 +240,7 @@ class NextView(hfg.Node):
 
     @hfg.slot
     def found(self) -> None:
-        """Begin anew the next time."""
+        """Start over the next time."""
         self.views = 0
 
 

@@ -1,4 +1,4 @@
-"""Asking for pictures: what nobody asks for is not even taken."""
+"""Requests for pictures: a picture without a request is not even taken."""
 
 from __future__ import annotations
 

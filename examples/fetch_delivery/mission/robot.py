@@ -41,7 +41,7 @@ class Perception(hfg.Subgraph):
       scan: of the laser.
       front: pictures of what is ahead.
       basket: pictures of the basket.
-      ask: look anew what lies in the basket.
+      ask: check again what is in the basket.
       forget: the number of a sign that is not where it should be.
       localised: where the robot is.
       others: other robots, in the map frame.
@@ -125,7 +125,7 @@ class Robot(hfg.Subgraph):
       front: pictures of what is ahead.
       basket: pictures of the basket.
       command: the velocity that it wants.
-      lamp: whether its lamp shall be on.
+      lamp: whether its lamp should be on.
       look_ahead: asks for a picture of what is ahead.
       look_into_basket: asks for one of the basket.
       begin: where activity arrives.
@@ -247,7 +247,7 @@ def build(
       seed: decides what looks like chance.
       robots: how many, one to four.
       speed: of their motors, in m/s.
-      faults: what shall go wrong.
+      faults: what should go wrong.
       gated: pictures are taken when a step asks for them; else all the time, to see what that saves.
       cut: perception and control of the robots run in a process each, beside that of the arena; in virtual time, which
         processes do not share, they are cut as well, but run on one loop.

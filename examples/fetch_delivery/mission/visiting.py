@@ -36,7 +36,7 @@ class SetLamp(hfg.Subgraph):
     """Set the signal lamp, then hand the activity on (figure 17 b).
 
     Attributes:
-      on: whether it shall be on.
+      on: whether it should be on.
       tick: anything that comes again and again.
       lamp: the command, once.
       begin: where activity arrives.
@@ -88,8 +88,8 @@ class WaitForCube(hfg.Node):
     """Wait until somebody has put a cube into the basket, or has taken it out.
 
     Attributes:
-      loading: whether a cube shall come, or go.
-      ask: asks the cube detection to look anew.
+      loading: whether a cube should come, or go.
+      ask: asks the cube detection to look again.
       done: it has happened; with the number of the cube, 0 when there is none.
       begin: where activity arrives.
       unwanted: a cube with this number does not count: it is to be given back for another one.
@@ -104,7 +104,7 @@ class WaitForCube(hfg.Node):
 
     @hfg.slot
     def begin(self) -> None:
-        """Look anew."""
+        """Look again."""
         self.ask.trigger()
 
     @hfg.slot
@@ -138,10 +138,10 @@ class AtStation(hfg.Subgraph):
       number: a cube with this number lies in the basket.
       none: no cube lies there.
       command: velocities.
-      lamp: whether the lamp shall be on.
+      lamp: whether the lamp should be on.
       look: asks for a picture of what is ahead.
       look_into_basket: asks for one of the basket.
-      ask: asks the cube detection to look anew.
+      ask: asks the cube detection to look again.
       done: a cube has changed hands.
     """
 
@@ -157,7 +157,7 @@ class Visit(AtStation):
     """Go to a station, stand below its ring, show the lamp until a cube has changed hands, and leave.
 
     Attributes:
-      loading: whether a cube shall come, or go.
+      loading: whether a cube should come, or go.
       queueing: so long it waits for another robot to leave the station.
       unwanted: a cube with this number is to be given back.
       begin: the station; where activity arrives.
@@ -223,7 +223,7 @@ class Visit(AtStation):
         graph.promote(self.queueing, go_to.ports.parameters["queueing"])
 
     def _feed(self, graph: hfg.Graph) -> None:
-        """Give each step the data it needs, and let those that are not active rest."""
+        """Send each step the data it needs, and let those that are not active rest."""
         wall = graph.add(wall_ahead(), name="wall")
         shutter, basket = graph.add(Shutter(n=2), name="shutter"), graph.add(Shutter(n=4), name="basket")
         go_to, position, dock = graph["go_to"], graph["position"], graph["dock"]

@@ -24,7 +24,7 @@ class World(hfg.Node):
     Attributes:
       seed: decides what looks like chance.
       speed: of the motors.
-      faults: what shall go wrong.
+      faults: what should go wrong.
       cameras: what draws the pictures.
       odometry: of each robot; their number is that of the robots.
       scan: of each robot.

@@ -133,5 +133,5 @@ class CubeWatch(hfg.Node):
 
     @hfg.slot
     def ask(self) -> None:
-        """Begin anew."""
+        """Start over."""
         self.last, self.told, self.count = None, None, 0

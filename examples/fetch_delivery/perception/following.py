@@ -28,7 +28,7 @@ class Limits:
 
     Attributes:
       speed: in m/s.
-      turning: in rad/s; slow, for pictures are blurred by it.
+      turning: in rad/s; slow, because it blurs pictures.
       braking: in m/s2; less than the motors can, for what is ahead may come nearer.
       wall: the gap that is kept from walls, in metres.
       robot: the gap that is kept from other robots.
@@ -227,7 +227,7 @@ class GiveWay(hfg.Node):
     """Hold back what would lead too fast at another robot, whoever commands it.
 
     Steps that drive without looking, such as backing off, need not care for others: here all commands pass. Walls are
-    not looked at, for a robot has to dock.
+    ignored because a robot has to dock.
 
     Attributes:
       gap: that is kept.

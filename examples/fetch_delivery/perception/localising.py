@@ -200,8 +200,8 @@ def _turned(pose: Any, steps: int) -> Any:
 def _quality(points: Any, pose: Any) -> float:
     """Return how many of the points lie on the shape, of those that nothing else can explain.
 
-    What lies in the free may be another robot. What lies beyond the wall or within the octagon, or on neither although
-    the octagon would have been in the way, speaks against the pose.
+    Something in free space may be another robot. What lies beyond the wall or within the octagon, or on neither
+    although the octagon would have been in the way, speaks against the pose.
     """
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     places = points @ np.array([[cos, sin], [-sin, cos]]) + pose[:2]

@@ -37,7 +37,7 @@ class Path:
 
     Attributes:
       points: of the map frame, in metres; the last is the goal.
-      heading: that the robot shall have there.
+      heading: that the robot should have there.
       waits: the goal is taken; the path leads to where the robot can wait for it.
     """
 
@@ -51,7 +51,7 @@ def plan(start: Any, goal: Any, others: Sequence[Disk] = (), *, beside: bool = F
 
     Args:
       start: where the robot is.
-      goal: where it shall go.
+      goal: where it should go.
       others: robots, which it keeps away from: more from where they will be soon, and more from their one side than
         from the other, so that two who meet both keep to their right.
       beside: lead to the nearest place that is free if the goal is not.
@@ -82,7 +82,7 @@ def queue(start: Any, goal: Any, others: Sequence[Disk], lane: float) -> tuple[V
 
     Args:
       start: where the robot is.
-      goal: the pose to which it shall go.
+      goal: the pose to which it should go.
       others: robots.
       lane: how far beyond the goal it is to be free.
 
@@ -136,7 +136,7 @@ def _nearest(free: Any, place: Any) -> Any:
 
 
 class PlanPath(hfg.Node):
-    """Plan a path to a goal, and plan it anew while the robot and others move.
+    """Plan a path to a goal, and replan it while the robot and others move.
 
     Fires once for each pose with the other robots of its time; it is silent without a goal, and while the scan does not
     fit to the pose. A robot that only does not know which of the places that look the same it is at drives on: walls

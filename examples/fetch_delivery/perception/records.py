@@ -83,7 +83,10 @@ class Localised:
 
     @property
     def fits(self) -> bool:
-        """Whether the scan fits to the pose, be it the right one of those that look the same or not: safe to drive."""
+        """Whether the scan fits the pose, so that it is safe to drive.
+
+        The pose need not be the right one of those that look the same.
+        """
         return self.quality > 0.6
 
     def place(self, x: float, y: float) -> tuple[float, float]:

@@ -37,7 +37,7 @@ class SignMap(hfg.Node):
     robot that has lost itself would move all signs.
 
     Attributes:
-      least: so many sightings make a digit known.
+      least: number of sightings that make a digit known.
       sightings: digits in the robot's frame.
       localised: where the robot was then.
       signs: the digits that are known, by their number.

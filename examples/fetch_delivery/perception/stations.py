@@ -54,7 +54,7 @@ class StationMap(hfg.Node):
     octagon: where one was seen often enough all four are known. While the pose is in doubt nothing is learned.
 
     Attributes:
-      least: so many sightings make a station known.
+      least: number of sightings that make a station known.
       targets: bull's-eyes in the robot's frame.
       localised: where the robot was then.
       filling: the filling stations, counter-clockwise; empty as long as none was seen.

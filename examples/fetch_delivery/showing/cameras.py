@@ -1,4 +1,4 @@
-"""What the cameras saw, with what was found in it drawn in."""
+"""Pictures of the cameras, with the results drawn in."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ SEED: Final = 1
 
 
 class Arena:
-    """An arena in which nobody has moved yet."""
+    """An arena in which no robot has moved yet."""
 
     def __init__(self) -> None:
         """Build it, with four robots."""

@@ -56,7 +56,7 @@ class Planes:
 
     @cached_property
     def rows(self) -> list[tuple[float, float, float]]:
-        """Give them as plain numbers: faster than arrays for one point."""
+        """Return them as plain numbers: faster than arrays for one point."""
         return [(float(n[0]), float(n[1]), float(d)) for n, d in zip(self.normals, self.offsets, strict=True)]
 
 

@@ -28,7 +28,7 @@ class Fault:
             raise ValueError(f"a fault begins at 0 s or later and lasts, not from {self.at_s} s for {self.lasts_s} s")
 
     def lasts(self, now_s: float) -> bool:
-        """Say whether it is under way."""
+        """Return whether it is in progress."""
         return self.at_s <= now_s < self.at_s + self.lasts_s
 
 

@@ -69,7 +69,7 @@ class MujocoRenderer(Renderer):
             self._gl.scene.flags[flag] = 0
 
     def close(self) -> None:
-        """Give the context back."""
+        """Release the context."""
         self._gl.close()
 
     def _draw_front(

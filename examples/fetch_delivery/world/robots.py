@@ -1,7 +1,7 @@
 """How a robot moves, what it bumps into, and where its wheels believe it is.
 
-It can drive in every direction and turn meanwhile, both within limits of speed and acceleration. It brakes if nobody
-has commanded anything for a while. Numbers are plain floats here: arrays of three are slower than three numbers.
+It can drive in every direction and turn meanwhile, both within limits of speed and acceleration. It brakes without a
+command for a while. Numbers are plain floats here: arrays of three are slower than three numbers.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class Robot:
         self.x, self.y, self.theta = _moved(self.x, self.y, self.theta, self.vx * dt, self.vy * dt, self.omega * dt)
 
     def push_out(self, nx: float, ny: float, depth: float) -> None:
-        """Give way to something it touches: by `depth` along a normal, and without the speed against it."""
+        """Send way to something it touches: by `depth` along a normal, and without the speed against it."""
         self.contact = True
         self.x += nx * depth
         self.y += ny * depth
@@ -106,7 +106,7 @@ class Robot:
             self.vy -= against * (cos * ny - sin * nx)
 
     def shift(self, dx: float, dy: float, turn: float) -> None:
-        """Be moved by somebody, as seen from the robot: its wheels do not notice."""
+        """Be pushed, as seen from the robot: its wheels do not notice."""
         self.x, self.y, self.theta = _moved(self.x, self.y, self.theta, dx, dy, turn)
 
     def mislead(self, dx: float, dy: float, turn: float) -> None:

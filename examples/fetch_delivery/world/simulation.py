@@ -66,7 +66,7 @@ class Simulation:
           seed: decides what looks like chance.
           robots: how many.
           limits: what their motors can do.
-          faults: what shall go wrong.
+          faults: what should go wrong.
           start_s: when the referee says "start".
           cameras: what draws the pictures: the light renderer, or MuJoCo, which needs a package and OpenGL.
 
