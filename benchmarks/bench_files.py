@@ -20,7 +20,7 @@ NODES = 1_000
 
 
 def chain(length: int) -> hfg.Graph:
-    """A chain of so many nodes, as somebody has drawn it."""
+    """A chain of `length` nodes, as a user would draw it."""
     graph = hfg.Graph("chain")
     port = graph.add(Script(count=length), name="source").ports.outputs["out"]
     for number in range(length - 2):

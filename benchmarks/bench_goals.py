@@ -56,7 +56,7 @@ def case(name: str, run: Callable[[int], Any], size: int, unit: str = "us", need
 
 
 def peer(module: str, who: str, work: str, *made_with: Any) -> Callable[..., Any]:
-    """The work of somebody else, who is imported when it is done: other processes stay free of him."""
+    """The work of another package, which is imported on use, so that other processes do not load it."""
 
     def do(*arguments: int) -> Any:
         return getattr(getattr(import_module(f"benchmarks.peers.{module}"), who)(*made_with), work)(*arguments)

@@ -59,7 +59,7 @@ def rows() -> None:
 
 
 def leaky_rows() -> None:
-    """Those who can do without waiting for anybody."""
+    """Packages that can send without waiting."""
     row("hfg edge, latest", partial(crossing.edge, 8), 400_000, 200_000, leaky=True)
     row("hfg link, bounded, over Zenoh", partial(crossing.link, 1, "zenoh"), 20_000, 150, leaky=True)
     row("hfg publish and subscribe, latest", partial(crossing.meeting, 1), 20_000, 150, leaky=True)
@@ -99,7 +99,7 @@ def add(name: str, run: Callable[[int], Any], size: int, unit: str = "us", needs
 
 
 def peer(module: str, work: str) -> Callable[..., dict[str, float]]:
-    """The work of somebody else, who is imported when it is done: other processes stay free of him."""
+    """The work of another package, which is imported on use, so that other processes do not load it."""
 
     def do(job: Job, **options: Any) -> dict[str, float]:
         figures: dict[str, float] = getattr(import_module(f"benchmarks.peers.{module}"), work)(job, **options)

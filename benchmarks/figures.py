@@ -1,4 +1,4 @@
-"""How figures are written, and what is said of the runs that they come from."""
+"""How figures are written, and the descriptions of the runs that they come from."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class Goal(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What the rounds say about a goal."""
+    """The result of the rounds for a goal."""
 
     ours: float
     peer: float
@@ -80,7 +80,7 @@ def verdicts(goals: Iterable[Goal], records: Iterable[Record], missing: Mapping[
     Args:
       goals: the lines.
       records: what was measured.
-      missing: why a case was not: nobody there to be measured, or a failure, of which the last line is shown.
+      missing: why a case is missing: the package is not installed, or a failure, of which the last line is shown.
     """
     found = {record.case: record for record in records}
     goals = list(goals)

@@ -83,7 +83,7 @@ def measure(
     Args:
       name: of the suite's module.
       runs: how many fresh processes for each case.
-      say: hears what is going on.
+      say: called with progress messages.
       only: these cases, by default all.
       quick: each at a tenth of its size.
       against: a checkout of hfg, with which the suite's `AGAINST` are measured too, as `before: ...`.
@@ -180,7 +180,7 @@ def machine() -> str:
 
 
 def versions(*packages: str) -> dict[str, str]:
-    """What the packages are at; one that runs from its sources has no version here."""
+    """Versions of the packages; one that runs from its sources has no version here."""
     found = {}
     for package in packages:
         with suppress(importlib.metadata.PackageNotFoundError):

@@ -1,7 +1,7 @@
 """The clocks that every participant carries in its sink or source, so that all are measured from the same points.
 
-Start-up and shutdown are not measured, and the first tenth of the tokens is the warm-up. What did not arrive is an
-error here: nobody is fast by losing tokens.
+Start-up and shutdown are not measured, and the first tenth of the tokens is the warm-up. A token that did not arrive is
+an error here: losing tokens must not count as speed.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Arrivals:
             self.ended = (perf_counter(), process_time())
 
     def figures(self, hops: int = 1) -> dict[str, float]:
-        """Microseconds a token, divided by its hops: by the clock, and of this process alone.
+        """Microseconds per token, divided by its hops: by the clock, and of this process only.
 
         The two differ when the machine was busy with something else, or when a participant rests or has more threads.
         """

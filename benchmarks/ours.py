@@ -180,7 +180,7 @@ class Outside(Participant):
 
 
 class States(Participant):
-    """Ten nodes that hand the activity round: a state machine that goes on by itself."""
+    """Ten nodes that pass the activity round: a state machine that runs by itself."""
 
     name = "hfg, activity round ten nodes"
 

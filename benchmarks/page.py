@@ -110,7 +110,7 @@ def links(records: Records) -> str:
 
 
 def leaky(records: Records) -> str:
-    """From one process to another, nobody waits."""
+    """From one process to another, without waiting."""
     return crossing(records, "leaky, ")
 
 
@@ -162,7 +162,7 @@ def seconds(records: Records) -> str:
 
 
 def profile(records: Records) -> str:
-    """Shares, what they are of the hop, and the parts that can be measured alone."""
+    """Shares of the hop, and the parts that can be measured separately."""
     parts = [record for record in records.values() if record.unit == "%"]
     times = [record for record in records.values() if record.unit != "%"]
     hop = times[0].median

@@ -1,8 +1,8 @@
-"""What crosses from one process to another in the benchmarks of links, and who notes when it has arrived.
+"""The messages between processes in the benchmarks of links, and the recorder of their arrivals.
 
 A letter has 100 bytes, a picture 6.2 megabytes: a frame of 1080p in colour, always the same one, which nobody writes
-to. Both carry their number and the moment at which they were sent, of the clock that all processes of a host share:
-the letter in its bytes, the picture beside it.
+to. Both carry their number and the moment at which they were sent, of the clock that all processes of a host share: the
+letter in its bytes, the picture beside it.
 """
 
 from __future__ import annotations

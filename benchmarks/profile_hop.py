@@ -102,7 +102,7 @@ def shares(lines: Iterable[str], written: Mapping[str, Sequence[str]] | None = N
 
     Args:
       lines: of py-spy's raw form.
-      written: the lines of what is no file: the code of fused regions, by its name.
+      written: the lines of code without a file: fused regions, by name.
     """
     texts = written or {}
     found: Counter[str] = Counter()

@@ -55,7 +55,7 @@ def silent(half: bool, tokens: int) -> dict[str, float]:
 
 
 def active_edge(tokens: int) -> dict[str, float]:
-    """Run ten functions with an active edge in their middle, of whom nobody is ever active; microseconds a hop."""
+    """Run ten functions with an active edge in their middle, none of which is ever active; microseconds per hop."""
     meter = Arrivals(tokens)
     graph = hfg.Graph("active edge")
     port = FUNCTION.line(graph, graph.add(numbers(count=tokens)).out, 4)

@@ -27,7 +27,7 @@ DOCK = 0.3 + 0.3j
 
 
 class Senses(NamedTuple):
-    """What the cleaner knows of its surroundings; the way home is in metres, as seen from its nose."""
+    """The cleaner's knowledge of its surroundings; the way home is in metres, as seen from its nose."""
 
     bumped: bool
     dirt: float
@@ -228,7 +228,7 @@ def build(seed: int = 1, by_letters: bool = False) -> hfg.Graph:
 
 
 class World:
-    """What the cleaner does to the room, and what it senses there."""
+    """The effects of the cleaner on the room, and its sensor data."""
 
     def __init__(self, seed: int) -> None:
         chance = random.Random(seed)
@@ -251,7 +251,7 @@ class World:
 
 
 class Room(hfg.Node):
-    """Moves the cleaner as it was told, ten times a second."""
+    """Moves the cleaner as commanded, ten times per second."""
 
     senses = hfg.Output(Senses)
     seed = hfg.Parameter(1)

@@ -24,7 +24,7 @@ RATE_HZ = 100.0
 
 
 class Cart(hfg.Node):
-    """A kilogram on wheels with some friction, and a ruler beside it."""
+    """A kilogram on wheels with some friction, next to a ruler."""
 
     position = hfg.Output(float)
     force = hfg.Parameter(0.0)

@@ -35,7 +35,7 @@ def detect(image: str) -> str | None:
 
 
 class Search(hfg.Node):
-    """Drives around until it is told of a cube."""
+    """Drives around until a cube is reported."""
 
     found = hfg.Event(str)
 

@@ -291,7 +291,7 @@ VIEWS = tuple(rect(3.5, pi / 4 * eighth) for eighth in range(8))  # counter-cloc
 
 @hfg.node
 async def referee(*, says: tuple[tuple[float, str], ...] = ((1, "ready?"), (2.2, "start"))) -> AsyncIterator[str]:
-    """Simulate the radio: a pause in seconds, and what is said then."""
+    """Simulate the radio: a pause in seconds, and the message after it."""
     for pause_s, message in says:
         await asyncio.sleep(pause_s)
         tell(f'the referee says "{message}"')
@@ -299,7 +299,7 @@ async def referee(*, says: tuple[tuple[float, str], ...] = ((1, "ready?"), (2.2,
 
 
 class Arena(hfg.Node):
-    """Moves the robot as commanded, twice a second; somebody hands over a cube while its lamp is green."""
+    """Moves the robot as commanded, twice a second; a cube is handed over while its lamp is green."""
 
     pose, signs, basket = hfg.Output(Point), hfg.Output(Map), hfg.Output(str)
     delivered = hfg.Event(int)

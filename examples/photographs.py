@@ -168,7 +168,7 @@ def clean(sight: Sight, *, strength: Annotated[float, Interval(gt=0, le=30)] = 8
 
 @hfg.node
 def fit(sight: Sight) -> Measured:
-    """Fit an ellipse to every circle, and find the lines anew in the clean picture."""
+    """Fit an ellipse to every circle, and find the lines again in the clean picture."""
     picture = sight.picture
     rims = [fit_rim(picture, circle) for circle in sight.circles]
     sharpness = float(cv2.Laplacian(picture, cv2.CV_64F).var())
@@ -205,7 +205,7 @@ class Measure(hfg.Subgraph):
 
 
 class Search(hfg.Node):
-    """Tells of photographs with something in them that nobody has reported yet."""
+    """Reports photographs with something in them that was not reported yet."""
 
     sight = hfg.Input(Sight)
     found = hfg.Event(str)
@@ -221,7 +221,7 @@ class Search(hfg.Node):
 
 
 class Measuring(hfg.Node):
-    """While active, gathers measurements of the photograph it was told of until there are enough."""
+    """While active, gathers measurements of the reported photograph until there are enough."""
 
     measured = hfg.Input(Measured)
     enough = hfg.Event(list[Measured])
@@ -338,7 +338,7 @@ def draw(look: Measured, summary: Summary) -> Image:
 
 
 class Watched(NamedTuple):
-    """What a run found, everything that happened in it, and the CPU seconds it took."""
+    """The results of a run, its events, and its CPU seconds."""
 
     summaries: list[Summary]
     events: list[TraceEvent]

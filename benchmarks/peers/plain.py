@@ -1,4 +1,4 @@
-"""Python alone: what the work costs without any framework."""
+"""Plain Python: the cost of the work without any framework."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Calls(Participant):
 
 
 class Bare(Participant):
-    """The same functions one after the other, written out: what somebody writes who needs no graph."""
+    """The same functions one after the other, written out: code for users who need no graph."""
 
     name = "bare calls"
 

@@ -1,6 +1,6 @@
-"""Two processes with the standard library alone: a pipe, and slots in shared memory that semaphores guard.
+"""Two processes with only the standard library: a pipe, and slots in shared memory that semaphores guard.
 
-Nothing is lost; the one that sends waits. What a leaky one would be is not tried.
+Nothing is lost; the one that sends waits. A leaky variant is not tried.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def send_to_pipe(job: Job, pipe: Any) -> None:
 
 
 def ring(job: Job) -> dict[str, float]:
-    """Slots in shared memory: what has arrived is looked at where it lies, and its slot given back then."""
+    """Slots in shared memory: what has arrived is looked at where it lies, and its slot returned then."""
     size = HEAD.size + (len(letter(0)) if job.what == "letter" else len(picture_bytes()))
     memory = SharedMemory(create=True, size=SLOTS * size)
     buffer = view_of(memory)

@@ -34,7 +34,7 @@ def destination(odometry: Odometry, x: float, y: float, turn: float) -> Pose:
 
 
 def move(odometry: Odometry, goal: Pose, *, turns: bool, speed: float) -> Twist | None:
-    """Go to a pose by the wheels alone; None: it is there. One that does not turn lets the heading drift."""
+    """Go to a pose by odometry only; None: it is there. One that does not turn lets the heading drift."""
     x, y, theta = odometry.pose
     cos, sin = math.cos(theta), math.sin(theta)
     dx, dy, turn = goal[0] - x, goal[1] - y, goal[2] - theta

@@ -1,4 +1,4 @@
-"""A mission from its beginning to its end: under a bar of progress, until its time is over or somebody stops it."""
+"""A mission from its beginning to its end: under a bar of progress, until its time is over or it is stopped."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class Result:
 
     Attributes:
       outcome: its time was "over", it was "late" by the clock on the wall, "interrupted" by Ctrl-C, or it "failed".
-      simulated_s: how long it has gone on in the arena.
+      simulated_s: how long it has run in the arena.
       took_s: how long that has taken.
-      processor_s: how long processors have worked for that.
+      processor_s: CPU time of the run.
       scores: one for each robot; none if it failed before it began.
       error: a sentence, if it failed.
     """
@@ -123,7 +123,7 @@ def _ends_like_ctrl_c(number: signal.Signals) -> Iterator[None]:
 
 
 class _Watch:
-    """Looks at a mission twice a second of its own time: timers of the loop cost nothing in between."""
+    """Checks a mission twice per second of its own time: timers of the loop cost nothing in between."""
 
     def __init__(self, seconds: float, within_s: float | None, simulation: Callable[[], Any]) -> None:
         self.began, self.worked = time.monotonic(), _processor_s()

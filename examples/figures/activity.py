@@ -80,7 +80,7 @@ class Last(hfg.Node):
 
 
 def figure_12() -> hfg.Graph:
-    """A data flow and a machine, which talk by messages alone."""
+    """A data flow and a machine, which communicate only by messages."""
     graph = hfg.Graph("figure 12")
     source, listener = graph.add(messages(), name="v_k", max_rate_hz=1), graph.add(Listener(), name="v_l")
     first, second, last = graph.add(First(), name="S_1"), graph.add(Second(), name="S_2"), graph.add(Last(), name="S_q")

@@ -75,7 +75,7 @@ class Button(hfg.Node):
 
 
 class Lamp(hfg.Node):
-    """Counts what it was told, however it was told."""
+    """Counts what it receives, by whichever port."""
 
     count = hfg.State(0)
 
@@ -86,7 +86,7 @@ class Lamp(hfg.Node):
 
 
 def figure_4() -> hfg.Graph:
-    """Events send signals to slots, many to many; nobody waits for anybody."""
+    """Events send signals to slots, many to many; nothing waits."""
     graph = hfg.Graph("figure 4")
     left, right = graph.add(Button(), name="left"), graph.add(Button(), name="right")
     red, green = graph.add(Lamp(), name="red"), graph.add(Lamp(), name="green")

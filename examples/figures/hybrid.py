@@ -38,7 +38,7 @@ class Compare(hfg.Node):
 
 
 class Record(hfg.Node):
-    """Writes down data, and starts afresh on a signal; that goes past the data."""
+    """Writes down data, and starts over on a signal; that goes past the data."""
 
     value = hfg.Input(int)
     written = hfg.State(factory=list[int])

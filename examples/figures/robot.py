@@ -93,7 +93,7 @@ class Export(hfg.Node):
 
 
 class Before(hfg.Node):
-    """What the robot did before; ends after a while, by its time limit."""
+    """The previous behaviour of the robot; ends after a while, by its time limit."""
 
 
 def figure_17b() -> hfg.Graph:

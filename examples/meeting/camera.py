@@ -3,8 +3,8 @@
     camera ── publish ┄┄┄┄ camera/front ┄┄┄┄ subscribe ── locate ── show
     camera.py                                viewer.py
 
-Shown: `hfg.publish` gives what leaves a port to whoever has subscribed. Nobody is waited for while nobody is there, so
-the camera runs alone, too; a viewer that wants every picture holds it up as if both were in one graph. The camera makes
+Shown: `hfg.publish` gives what leaves a port to whoever has subscribed. Without a viewer it does not wait, so the
+camera also runs by itself; a viewer that wants every picture holds it up as if both were in one graph. The camera makes
 its pictures itself: a bright disc on its way around. Run it with `hfg run examples/meeting/camera.py`, and in another
 terminal `hfg run examples/meeting/viewer.py`; this needs `pip install 'hfg[zenoh]'`.
 """

@@ -45,7 +45,7 @@ def bar_code(digits: Annotated[str, Predicate(is_article)], *, bar: Annotated[in
       bar: how wide the narrowest bar is, in pixels.
 
     Raises:
-      ValueError: that is no number of an article.
+      ValueError: that is not an article number.
     """
     if not is_article(digits):
         raise ValueError(f'an article has 13 digits, the last of which checks the others, got "{digits}"')
@@ -60,7 +60,7 @@ def bar_code(digits: Annotated[str, Predicate(is_article)], *, bar: Annotated[in
 
 @hfg.node
 def label(bars: Gray, dots: Gray) -> Gray:
-    """Print both codes on a label, beside each other."""
+    """Print both codes on a label, side by side."""
     height = max(bars.shape[0], dots.shape[0])
     parts = [
         cv2.copyMakeBorder(one, (height - one.shape[0]) // 2 + 20, (height - one.shape[0] + 1) // 2 + 20, 10, 10,

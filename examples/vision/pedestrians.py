@@ -11,11 +11,11 @@ branches of which one at a time has a value, and how a cheap second opinion take
 takes for a person, but does not move, is none. The video is vtest.avi of OpenCV, a street with people who walk:
 
     apt-get install opencv-doc                                  # then it is found by itself
-    python examples/vision/pedestrians.py [VIDEO]
-    hfg run examples/vision/pedestrians.hfg.yaml --allow pedestrians --param street.path=VIDEO
+    python examples/vision/pedestrians.py [VIDEO] hfg run examples/vision/pedestrians.hfg.yaml --allow pedestrians
+    --param street.path=VIDEO
 
 Without it a camera pans over a photograph of scikit-image, whose only person is so near that her face is looked for.
-What was found is said; out/pedestrians.avi shows all pictures, out/pedestrians.png the newest one. The graph file
+Results are reported; out/pedestrians.avi shows all pictures, out/pedestrians.png the newest one. The graph file
 pedestrians.hfg.yaml is the same graph; `hfg convert` has made it of this one.
 """
 
@@ -114,7 +114,7 @@ class Count(hfg.Node):
 
     Attributes:
       found: before those who do not move were taken out.
-      kept: behind that.
+      kept: after that.
       summary: a sentence, when there is no more.
     """
 

@@ -162,7 +162,7 @@ def _kind(edge: FlatEdge) -> str:
 
 
 def mission(sort: Sort, seed: int, minutes: float) -> dict[str, Any]:
-    """Let one robot work alone, and say what came of it and what it took."""
+    """Let one robot work by itself, and report its results and costs."""
     graph = build(seed, kind=KINDS[sort])
     began = time.process_time()
     report = hfg.run(graph, clock="virtual", until_s=60 * minutes)

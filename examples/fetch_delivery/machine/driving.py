@@ -1,6 +1,6 @@
 """How the robot drives in a state, as plain classes: made when the state is entered, asked for a command at each tick.
 
-A step returns the command and how it ended: nothing while it goes on. Laws, plans, paths and walls are the functions
+A step returns the command and how it ended: nothing while it continues. Laws, plans, paths and walls are the functions
 that the nodes of `mission.driving` call too.
 """
 
@@ -25,7 +25,7 @@ Step: TypeAlias = tuple[Twist, End | None]
 
 @dataclass
 class Move:
-    """Move a given distance by the wheels alone, or turn on the spot.
+    """Move a given distance by odometry only, or turn on the spot.
 
     Attributes:
       x: how far ahead; negative is back.
@@ -56,7 +56,7 @@ class GoTo:
       near: how near to it is there.
       aligned: and how near to its heading.
       lane: how far beyond the goal it has to be free; the robot waits for that at a distance.
-      queueing: and not longer than so many seconds.
+      queueing: and not longer than this number of seconds.
       every: plan with each so many-th pose.
       without_path: so many seconds without any path are too long.
       patience: so many seconds may the robot come no nearer.

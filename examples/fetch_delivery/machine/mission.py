@@ -1,6 +1,6 @@
 """What the robot does when: the states, what leads from one to another, and what is done in each.
 
-A hierarchical state machine beside the data flow, stepped ten times a second. Fetching and delivering have the same
+A hierarchical state machine next to the data flow, stepped ten times per second. Fetching and delivering have the same
 states inside, for a visit at a station. Each state has a way in, something to do at each tick, and a time after which
 it is left; the table `STATES` is the whole structure.
 """

@@ -22,7 +22,7 @@ from hfg.nodes.robotics import Disk
 
 
 class MoveRobot(hfg.Node):
-    """Move a given distance in a given direction, by the wheels alone (paper, 6.1.3); or turn on the spot.
+    """Move a given distance in a given direction, by odometry only (paper, 6.1.3); or turn on the spot.
 
     Attributes:
       x: how far ahead; negative is back.

@@ -90,7 +90,7 @@ class FetchCube(AtStation):
 
     Attributes:
       stations: the filling stations that are known.
-      unwanted: a cube with this number is to be given back for another one.
+      unwanted: a cube with this number is to be exchanged for another one.
       begin: where activity arrives.
     """
 
@@ -202,7 +202,7 @@ class NextView(hfg.Node):
     Attributes:
       radius: from the middle of the arena.
       step: how far to go on, as an angle.
-      most: so many views in a row are more than once around; then it gives up.
+      most: this number of views in a row is more than once around; then it gives up.
       localised: where the robot is.
       goal: the pose.
       gave_up: nothing was found.

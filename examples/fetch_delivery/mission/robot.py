@@ -6,7 +6,7 @@
                                             ╚════════╩══ (no cube after all, or one to give back)
 
 There is no state machine: what is active is the state. `deliver` and `fetch` are built of the same `Visit`. `bring`
-counts how often a cube was brought in vain: one that nobody wants is reported and given back for another one.
+counts how often a cube was brought in vain: an unwanted cube is reported and exchanged for another one.
 """
 
 from __future__ import annotations
@@ -129,8 +129,8 @@ class Robot(hfg.Subgraph):
       look_ahead: asks for a picture of what is ahead.
       look_into_basket: asks for one of the basket.
       begin: where activity arrives.
-      report: the cube in the basket cannot be delivered, for its sign was not found or its station served nobody; its
-        number, or None if its code cannot be read.
+      report: the cube in the basket cannot be delivered, because its sign was not found or its station did not serve;
+        its number, or None if its code cannot be read.
     """
 
     odometry, scan, message = hfg.Input(Odometry), hfg.Input(Scan), hfg.Input(str)

@@ -69,7 +69,7 @@ class Approach(hfg.Node):
     Attributes:
       distance: how far before it that is.
       goal: the pose.
-      station: the station, for those who look for its sign.
+      station: the station, for nodes that look for its sign.
       begin: the station; where activity arrives.
     """
 
@@ -170,7 +170,7 @@ class Visit(AtStation):
     gave_up = hfg.Event(object)
 
     def build(self, graph: hfg.Graph) -> None:
-        """Put the steps in a row, and behind each what follows if it fails."""
+        """Connect the steps in a row, and after each the reaction to its failure."""
         approach, go_to = (
             graph.add(Approach(), name="approach"),
             graph.add(GoTo(lane=0.9), name="go_to", active_for_s=60.1),

@@ -98,7 +98,7 @@ class CubeWatch(hfg.Node):
       number: a cube of this station lies in the basket.
       unreadable: a cube lies there, but its code cannot be read.
       none: no cube lies there.
-      ask: tell again what is there, after it has been seen anew so often.
+      ask: report again what is there, after that number of new sightings.
 
     Raises:
       TypeError: the picture is not of 8 bits.

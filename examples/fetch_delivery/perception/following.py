@@ -140,7 +140,7 @@ class FollowPath(hfg.Node):
       path: what is to be followed.
       stop: follow nothing any more, and stand.
       arrived: the robot is at the goal.
-      blocked: it came no nearer for so many seconds, or waited for so many; it goes on trying.
+      blocked: it came no nearer for this number of seconds, or waited for as long; it keeps trying.
     """
 
     speed = hfg.Parameter(0.6, unit="m/s")
@@ -182,7 +182,10 @@ class FollowPath(hfg.Node):
         return twist
 
     def _queue(self, now: float, stands: bool) -> bool:
-        """Tell if it has waited for too long; whether it has told, for one firing gives the activity away only once."""
+        """Signal if it has waited for too long.
+
+        Return whether it has, because one firing passes the activity on only once.
+        """
         if not self.way.waits:
             self.queues_since = None
         elif self.queues_since is None:

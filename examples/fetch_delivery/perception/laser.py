@@ -50,7 +50,7 @@ def wall_ahead(scan: Scan, *, width: Annotated[float, Interval(gt=0, le=math.pi)
       width: of the sector in which it is looked for.
 
     Returns:
-      out: silence if there is no wall, or nothing straight; the back of another robot is none.
+      out: silence if there is no wall, or nothing straight; the back of another robot does not count.
     """
     points = scan_points.function(scan.ranges, scan.angles, max_range=scan.max_range)
     points = points[np.abs(np.arctan2(points[:, 1], points[:, 0])) <= width / 2]
@@ -134,7 +134,7 @@ class FollowRobots(hfg.Node):
         self.tracks = DiskTracks(memory=self.memory, fastest=_FASTEST, radius=_ROBOT)
 
     def process(self, seen: list[Disk], scan: Scan, localised: Localised) -> None:
-        """Follow them; while the scan does not fit to the pose nobody knows where they are."""
+        """Follow them; while the scan does not fit the pose, their places are unknown."""
         if not localised.fits:
             self.others.send([])
             self.around.send([])

@@ -19,7 +19,7 @@ class Sighting(NamedTuple):
       x: where its middle is, ahead of the robot's centre, in metres.
       y: to the left of it.
       facing: the direction into which the panel looks, in the robot's frame; NaN where the picture does not tell.
-      score: how well it looks like what it is said to be, 0 to 1.
+      score: how well it matches, 0 to 1.
     """
 
     label: str

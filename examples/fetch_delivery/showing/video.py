@@ -31,7 +31,7 @@ class VideoFile:
     Attributes:
       path: of the file; its ending says which of the two it has become.
       pictures: how many it holds, or will.
-      note: what is to be said about it, empty if all is well.
+      note: a remark, empty if all is well.
     """
 
     def __init__(self, folder: Path, name: str, size: tuple[int, int], rate_hz: float) -> None:
@@ -79,7 +79,7 @@ class VideoFile:
                 self._every *= 2
 
     def close(self) -> None:
-        """Finish it; what cannot be written is said in `note`, and there is no file then."""
+        """Finish it; a write error is reported in `note`, and there is no file then."""
         self._encoder.shutdown()
         if self._writer is not None:
             self._writer.release()

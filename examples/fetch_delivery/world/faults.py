@@ -1,4 +1,4 @@
-"""What can be made to go wrong, by name; each at a time, for a while.
+"""Faults that can be injected, by name; one at a time, for a while.
 
 Names and what they do are in `FAULTS`; `fault("pushed robot", at_s=40)` makes one.
 """

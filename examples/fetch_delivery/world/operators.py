@@ -1,7 +1,7 @@
 """The people at the stations: they put a cube into a robot's basket, or take it out, when its lamp is on.
 
-Within two to ten seconds, as the rules have it; now and then they are late, put the cube in askew so that its bar code
-cannot be read until they set it right, or overlook a lamp until it goes on again. Who brings a cube back to a filling
+Within two to ten seconds, by the rules; now and then they are late, put the cube in askew so that its bar code cannot
+be read until they set it right, or overlook a lamp until it goes on again. A robot that brings a cube back to a filling
 station gets another one for it.
 """
 
@@ -34,8 +34,8 @@ class Handover:
 class Operator:
     """Looks after one robot.
 
-    What it does and when is drawn by lot from its own numbers in the order of the lamps, so nobody else's doing has an
-    influence on it.
+    What it does and when is drawn by lot from its own numbers in the order of the lamps, so it is independent of other
+    robots.
     """
 
     def __init__(self, random: np.random.Generator) -> None:

@@ -32,7 +32,7 @@ class Score:
     driven_m: float = 0.0
 
     def unaccounted(self) -> list[tuple[float, int]]:
-        """Return the cubes that were given back without a word: since they were fetched, nothing was reported."""
+        """Return the cubes that were returned silently: nothing was reported after they were fetched."""
         times = [time for time, _ in self.fetched]
         silent = []
         for when, number in self.returned:

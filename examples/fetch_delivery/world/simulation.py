@@ -98,7 +98,7 @@ class Simulation:
 
     @property
     def now_s(self) -> float:
-        """How long it has gone on."""
+        """How long it has run."""
         return self._ticks * TICK_S
 
     # --- time ---
