@@ -11,8 +11,8 @@ branches of which one at a time has a value, and how a cheap second opinion take
 takes for a person, but does not move, is none. The video is vtest.avi of OpenCV, a street with people who walk:
 
     apt-get install opencv-doc                                  # then it is found by itself
-    python examples/vision/pedestrians.py [VIDEO] hfg run examples/vision/pedestrians.hfg.yaml --allow pedestrians
-    --param street.path=VIDEO
+    python examples/vision/pedestrians.py [VIDEO]
+    hfg run examples/vision/pedestrians.hfg.yaml --allow pedestrians --param street.path=VIDEO
 
 Without it a camera pans over a photograph of scikit-image, whose only person is so near that her face is looked for.
 Results are reported; out/pedestrians.avi shows all pictures, out/pedestrians.png the newest one. The graph file
