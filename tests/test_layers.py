@@ -100,7 +100,6 @@ WINGS = {
         "hfg.parts": 6,
     },
 }
-NAMES_ITSELF = "hfg.engine"  # its modules still import each other for type checkers; delete this with the last of them
 WAITING = {"asyncio", "anyio", "trio"}
 ORACLE_MUST_NOT_SHARE = ("hfg.ports", "hfg.activity", "hfg.engine")
 
@@ -197,10 +196,7 @@ def test_no_modules_import_each_other_in_a_cycle() -> None:
     """Imports inside functions count, as they only hide a cycle, and so do those for type checkers."""
     names = list(HFG)
     number = {name: index for index, name in enumerate(names)}
-    successors = []
-    for name in names:
-        found = imported(name, HFG[name], named=not name.startswith(f"{NAMES_ITSELF}."))
-        successors.append(sorted({number[one] for one, _ in found if one in number}))
+    successors = [sorted({number[one] for one, _ in imported(name, HFG[name]) if one in number}) for name in names]
     circles = [[names[index] for index in shortest_ring(part, successors)] for part in rings(successors)]
     assert not circles, "\n".join(" -> ".join([*ring, ring[0]]) for ring in circles)
 

@@ -137,12 +137,12 @@ def test_only_shared_time_is_measured() -> None:
         return 0.0
 
     group = LoopGroup("loop", Priority(), clock)
-    node = _Stepping()
-    group.push(node)  # type: ignore[arg-type]
+    node: Any = _Stepping()
+    group.push(node)
     group.take().step(node)
     assert (node.steps, reads) == (1, 0)
     fair = LoopGroup("loop", FairShare(), clock)
-    fair.push(node)  # type: ignore[arg-type]
+    fair.push(node)
     turn = fair.take()
     turn.step(turn)
     assert (node.steps, reads) == (2, 2)

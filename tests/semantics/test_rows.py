@@ -148,7 +148,7 @@ def rows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     found: list[int] = []
     had_turns = Group.had_turns
 
-    def noted(group: Group, more: int) -> None:
+    def noted(group: Group[Any], more: int) -> None:
         found.append(more)
         had_turns(group, more)
 

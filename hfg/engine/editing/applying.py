@@ -13,9 +13,7 @@ from typing import Any
 from hfg.engine.editing.plan_diff import PlanDiff
 from hfg.engine.editing.plan_index import PlanIndex
 from hfg.engine.fusion.specialise import specialise
-from hfg.engine.model.core import Core
-from hfg.engine.model.groups import Group
-from hfg.engine.model.scopes import Gate, Scope
+from hfg.engine.model import Core, Gate, Group, Scope
 from hfg.engine.model.worker import DISABLED, ENDED, RATE, REMOVED, RESTING, STARTING, Worker
 from hfg.engine.rules import lifecycle, wiring
 from hfg.engine.rules.activity import rest
@@ -464,7 +462,7 @@ class _Applying:
             worker.note_gated_start(float("-inf"))  # an idle rate counts from the first firing behind the gate
             gated[worker] = None
         self.touched |= gated
-        self.scopes |= {state: None for state in states if isinstance(state, Scope)}
+        self.scopes |= {state: None for state in states if not isinstance(state, Worker)}
         self.touched |= {state: None for state in states if isinstance(state, Worker)}
 
     def _watch(self) -> None:

@@ -24,7 +24,7 @@ from hfg.engine.editing.plan_index import PlanIndex
 from hfg.engine.editing.setting import refuse_without_effect
 from hfg.engine.editing.turns import Turns
 from hfg.engine.executing.code import answer, whose_code
-from hfg.engine.model.scopes import Scope
+from hfg.engine.model import Scope
 from hfg.engine.model.worker import BACKOFF, DISABLED, ENDED, UNREADY, Worker
 from hfg.engine.rules import concurrency, doing, lifecycle, subgraphs
 from hfg.engine.runtime import plan

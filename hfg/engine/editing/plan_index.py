@@ -10,8 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from hfg.engine.model.core import Core
-from hfg.engine.model.worker import Worker
+from hfg.engine.model import Core, Worker
 from hfg.graph.structure.sequence import Sequence
 from hfg.ports.edges import EventEdge
 

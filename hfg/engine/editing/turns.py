@@ -12,8 +12,7 @@ from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
 
 from hfg.engine.executing.code import whose_code
-from hfg.engine.model.flights import current_flight
-from hfg.engine.model.tasks import current_task
+from hfg.engine.model.current import current_flight, current_task
 from hfg.engine.model.worker import Worker
 from hfg.errors import UsageError
 

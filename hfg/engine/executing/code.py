@@ -19,10 +19,9 @@ from typing import Any, Protocol
 from hfg.engine.executing.carrier import Carrier
 from hfg.engine.executing.groups import Job
 from hfg.engine.executing.virtual import VirtualTimeLoop
-from hfg.engine.model.core import PENDING, Core
-from hfg.engine.model.flights import Flight, current_flight
-from hfg.engine.model.tasks import current_task
-from hfg.engine.model.worker import RunningEvent, Worker
+from hfg.engine.model import Core, Flight, RunningEvent, Worker
+from hfg.engine.model.core import PENDING
+from hfg.engine.model.current import current_flight, current_task
 from hfg.engine.rules import concurrency, errors
 from hfg.engine.rules.sending import trigger, trigger_beside
 

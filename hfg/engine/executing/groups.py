@@ -14,9 +14,8 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
-from hfg.engine.model.groups import Group
-from hfg.engine.model.policies import Policy
-from hfg.engine.model.worker import Worker
+from hfg.engine.model import Group, Worker
+from hfg.engine.model.groups import Policy
 from hfg.errors import UsageError
 
 __all__ = ["CheckedTurn", "Dispatching", "Job", "LoopGroup", "SideGroup", "ThreadGroup", "current_job"]
@@ -28,10 +27,10 @@ _DISPATCH_STEPS = 16  # how much one group may do on the loop before others have
 class LoopGroup(Group):
     """The nodes that run on the event loop itself."""
 
-    def __init__(self, name: str, policy: Policy, clock: Callable[[], float]) -> None:
+    def __init__(self, name: str, policy: Policy[Worker], clock: Callable[[], float]) -> None:
         super().__init__(name, policy, clock)
         self.in_a_row = True
-        if self.fair is not None:
+        if self.charges is not None:
             self.look_at_each_turn(_Turn(self).take)
 
 
@@ -89,7 +88,7 @@ class SideGroup(LoopGroup):
     def __init__(
         self,
         name: str,
-        policy: Policy,
+        policy: Policy[Worker],
         clock: Callable[[], float],
         ready_groups: deque[Dispatching],
         flags: Sequence[str],
@@ -191,7 +190,7 @@ class ThreadGroup(Group):
     def __init__(
         self,
         name: str,
-        policy: Policy,
+        policy: Policy[Worker],
         clock: Callable[[], float],
         ready_groups: deque[Dispatching],
         deliver: Callable[[deque[Any]], None],
@@ -242,7 +241,7 @@ class ThreadGroup(Group):
         lane = self._idle.pop() if self._idle else self._new_lane()
         job.lane = lane
         self.running += 1
-        if self.fair is not None:
+        if self.charges is not None:
             job.begin(self.clock())
         lane.jobs.put(job)
 
@@ -257,7 +256,7 @@ class ThreadGroup(Group):
         """A job came back; on the loop."""
         self.running -= 1
         self._idle.append(job.lane)
-        if self.fair is not None:
+        if self.charges is not None:
             self.charge(job.worker, self.clock() - job.began)
         if len(self.policy):
             self._ready_groups.append(self)
@@ -277,7 +276,7 @@ class ThreadGroup(Group):
 
     def abandon(self, what: str, job: Job) -> None:
         """X2: the job under way does not come back; the group goes on in a new thread."""
-        if self.fair is not None:
+        if self.charges is not None:
             self.charge(job.worker, self.clock() - job.began)
         lane = job.lane
         if lane in self._lanes:

@@ -10,8 +10,7 @@ import inspect
 from hfg.base.logs import Log, Logger
 from hfg.engine.executing.code import whose_code
 from hfg.engine.executing.groups import current_job
-from hfg.engine.model.core import Core
-from hfg.engine.model.worker import Worker
+from hfg.engine.model import Core, Worker
 
 __all__ = ["log_of_speaker", "speaker"]
 

@@ -16,9 +16,9 @@ from hfg.base.clock import current_clock, current_elapsed
 from hfg.base.logs import current_log
 from hfg.engine.executing.carrier import Carrier
 from hfg.engine.executing.code import CodeRunner, speak_for
-from hfg.engine.model.core import PENDING, Core
-from hfg.engine.model.flights import current_flight
-from hfg.engine.model.tasks import Doing, Task, Tasks, current_task
+from hfg.engine.model import Core, Doing, Task, Tasks
+from hfg.engine.model.core import PENDING
+from hfg.engine.model.current import current_flight, current_task
 from hfg.engine.model.worker import DISABLED, ENDED, TORN_DOWN, Worker
 from hfg.engine.rules import doing as do_activity
 from hfg.engine.rules import errors

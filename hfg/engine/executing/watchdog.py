@@ -12,8 +12,7 @@ import threading
 import time
 
 from hfg.base.logs import Log
-from hfg.engine.model.core import Core
-from hfg.engine.model.worker import Worker
+from hfg.engine.model import Core, Worker
 from hfg.graph.checks.nodes import needs_loop
 from hfg.nodetypes.node import Node
 

@@ -13,9 +13,8 @@ from types import CoroutineType
 from typing import Any
 
 from hfg.base.token import Token
-from hfg.engine.model.core import Core
-from hfg.engine.model.groups import Group
-from hfg.engine.model.worker import NO_CALLS, RunningEvent, Worker
+from hfg.engine.model import Core, Group, RunningEvent
+from hfg.engine.model.worker import NO_CALLS, Worker
 from hfg.engine.rules import errors, firing
 from hfg.engine.rules.agenda import add_call, freed, idle_again, note_full
 from hfg.engine.rules.calls import await_call

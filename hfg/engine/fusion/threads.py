@@ -24,7 +24,7 @@ from typing_extensions import override
 from hfg.base.token import NO_MESSAGE
 from hfg.engine.fusion.region import Region
 from hfg.engine.fusion.schedule import Schedule
-from hfg.engine.fusion.writing import Wave, Writer, write_wave
+from hfg.engine.fusion.writing import Fusible, Wave, Writer, write_wave
 from hfg.engine.model.core import Flags
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import firing
@@ -297,7 +297,7 @@ class ThreadRegion(Region):
 class _ThreadWriter(Writer):
     """Writes a wave that is called in the thread: the loop has taken the tokens, and puts what crosses the border."""
 
-    def __init__(self, region: Region, measured: bool) -> None:
+    def __init__(self, region: Fusible, measured: bool) -> None:
         super().__init__(region, measured)
         self.loops = self.real and self.is_source and not self.head.paced and not self.has_border
 

@@ -18,21 +18,19 @@ import linecache
 from collections.abc import Callable
 from time import monotonic
 from types import CodeType, CoroutineType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from hfg.base.token import NO_MESSAGE, Token
-from hfg.engine.fusion.schedule import asks_who_hears
+from hfg.engine.fusion.schedule import Schedule, asks_who_hears
 from hfg.engine.fusion.telling import Passed, Telling
-from hfg.engine.model.worker import Worker
+from hfg.engine.model import Core, Worker
+from hfg.engine.model.core import Flags
 from hfg.engine.rules.firing import take
 from hfg.engine.rules.releasing import make_room, release
 from hfg.engine.rules.sending import put
 from hfg.ports.edges import ACTIVITY, BufferEdge, EventEdge, SyncEdge
 
-if TYPE_CHECKING:
-    from hfg.engine.fusion.region import Region
-
-__all__ = ["Wave", "Writer", "write_wave"]
+__all__ = ["Fusible", "Wave", "Writer", "write_wave"]
 
 _EXCEPTIONAL = frozenset({Token, CoroutineType})
 """Results that do not simply leave: a token passed on, code that is still to be awaited."""
@@ -40,6 +38,22 @@ _EXCEPTIONAL = frozenset({Token, CoroutineType})
 _KEPT_SOURCES = 256
 _numbers = itertools.count(1)
 _shown: dict[str, None] = {}  # names of the newest sources that linecache knows
+
+
+class Fusible(Protocol):
+    """What is to be known of a region before the text of its wave is written; see `region.Region`."""
+
+    order: list[Worker]
+    schedule: Schedule
+    entries: tuple[Any, ...]
+    border: list[Any]
+    carriers: list[Worker]
+    core: Core
+    flags: Flags
+
+    @property
+    def head(self) -> Worker:
+        """Whose step runs the wave."""
 
 
 class Wave(NamedTuple):
@@ -58,7 +72,7 @@ class Wave(NamedTuple):
     untold: dict[int, list[Passed]]
 
 
-def write_wave(region: Region, writer: Writer, *, to: Any = None) -> Wave:
+def write_wave(region: Fusible, writer: Writer, *, to: Any = None) -> Wave:
     """Compile and bind what is written for a region.
 
     Args:
@@ -79,7 +93,7 @@ def write_wave(region: Region, writer: Writer, *, to: Any = None) -> Wave:
 class _Names:
     """What the text of a wave takes from its region, by the number of the member."""
 
-    def __init__(self, region: Region, measured: bool, telling: Telling) -> None:
+    def __init__(self, region: Fusible, measured: bool, telling: Telling) -> None:
         core = region.core
         host: Any = core.host
         order = region.order
@@ -116,7 +130,7 @@ def _take_queued(edge: BufferEdge | EventEdge) -> Token[Any]:
     return token
 
 
-def _values(region: Region, k: int, result: Any) -> list[Any] | None:
+def _values(region: Fusible, k: int, result: Any) -> list[Any] | None:
     """What member k has sent, or gives back, by output; None if that is not plain: a modifier or stamp, or twice."""
     worker = region.order[k]
     written = worker.written
@@ -175,7 +189,7 @@ def _show(name: str, text: str, calls: dict[int, int], paths: list[str]) -> None
 class Writer:
     """Writes the text of one wave; `calls` says afterwards which line calls which member."""
 
-    def __init__(self, region: Region, measured: bool) -> None:
+    def __init__(self, region: Fusible, measured: bool) -> None:
         self.order = region.order
         self.schedule = region.schedule
         self.outs = region.schedule.outs

@@ -4,8 +4,43 @@ vertex    one node in the plan: its code and its edges      shape     what these
 worker    one node while it runs                            core      one run, and what it needs of those above
 scopes    subgraphs, gates      groups    nodes that run one at a time      policies  who of them is next
 iteration   the border of a subgraph that iterates (G4)
-tasks     what a node's code has started beside its firings
-sharing   who uses which values, in debug mode
+flights   firings of a node that are under way at once      tasks     what its code has started beside its firings
+current   whose code runs       sharing   who uses which values, in debug mode      invariants  what holds of all of it
+
+These refer to each other all over, and import each other one way only: what stands below the class of nodes is generic
+in it. The names below have it filled in; they are for everybody outside of this wing.
 """
 
-__all__: list[str] = []
+from typing import TypeAlias
+
+from hfg.engine.model import core, events, flights, groups, iteration, scopes, tasks
+from hfg.engine.model.worker import Worker
+
+__all__ = [
+    "Core",
+    "Doing",
+    "Flight",
+    "Flights",
+    "Gate",
+    "Group",
+    "Host",
+    "Iteration",
+    "RunningEvent",
+    "Scope",
+    "Task",
+    "Tasks",
+    "Worker",
+]
+
+Core: TypeAlias = core.Core[Worker]
+Doing: TypeAlias = tasks.Doing[Worker]
+Flight: TypeAlias = flights.Flight[Worker]
+Flights: TypeAlias = flights.Flights[Worker]
+Gate: TypeAlias = scopes.Gate[Worker]
+Group: TypeAlias = groups.Group[Worker]
+Host: TypeAlias = core.Host[Worker]
+Iteration: TypeAlias = iteration.Iteration[Worker]
+RunningEvent: TypeAlias = events.RunningEvent[Worker]
+Scope: TypeAlias = scopes.Scope[Worker]
+Task: TypeAlias = tasks.Task[Worker]
+Tasks: TypeAlias = tasks.Tasks[Worker]

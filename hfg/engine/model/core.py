@@ -1,35 +1,32 @@
 """The state of one run, shared by the modules that decide over it.
 
-`sending` says what leaves a node, `firing` what a node does next, `wiring` which edges are live, `quiet` what
-happens when nothing moves, `steps` how the common shapes go fast. None of them waits: time, threads and coroutines
-are behind `Host`, which `run` implements. Stands on floors 0-4 and knows no asyncio.
+The rules decide over it and never wait: time, threads and coroutines are behind `Host` and `Code`, which are
+implemented where asyncio begins. It stands below the class of nodes, and so is generic in it.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Coroutine, Sequence
 from types import FrameType
-from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
+from typing import Any, Final, Generic, Literal, Protocol
 
 from typing_extensions import override
 
 from hfg.base.token import Token
+from hfg.engine.model.contracts import NodeT, Timer
+from hfg.engine.model.events import RunningEvent
 from hfg.engine.model.flights import Flight
 from hfg.engine.model.iteration import Iteration
 from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.tasks import Doing
-from hfg.engine.model.worker import RunningEvent, Worker
-from hfg.errors import EngineInternalError, HfgError
+from hfg.errors import HfgError
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.ports.events import EventPort
 from hfg.trace import TraceEvent
 
-if TYPE_CHECKING:
-    pass
-
-__all__ = ["PENDING", "Code", "Core", "Flags", "Host", "Region", "Timer", "Upstairs"]
+__all__ = ["PENDING", "Code", "Core", "Flags", "Host", "Region", "Upstairs"]
 
 
 class _Pending:
@@ -77,29 +74,29 @@ PENDING = _Pending()
 """What an executor returns for code that waits: its result comes later."""
 
 
-class Region(Protocol):
+class Region(Protocol[NodeT]):
     """Nodes whose firings are fused (see the wing `fusion`), as those below know it."""
 
-    head: Worker
+    head: NodeT
     running: bool
     waves: int
 
-    def at_work(self, frame: FrameType | None) -> Worker | None:
+    def at_work(self, frame: FrameType | None) -> NodeT | None:
         """Whose call a running wave is in, by the line it is at."""
 
-    def is_calling(self, worker: Worker) -> bool:
+    def is_calling(self, worker: NodeT) -> bool:
         """Whether the call of this member is the one under way in a running wave."""
 
-    def disturb(self, worker: Worker) -> None:
+    def disturb(self, worker: NodeT) -> None:
         """A member does not rest any more: the interpreted way goes on from here."""
 
-    def speaks(self, worker: Worker) -> bool:
+    def speaks(self, worker: NodeT) -> bool:
         """A member's code sends by itself: whether a fused call of it is under way."""
 
     def interrupt(self) -> None:
         """Let the wave under way end behind its present call."""
 
-    def abandon(self) -> Worker:
+    def abandon(self) -> NodeT:
         """The wave under way does not come back: whose call it is in."""
 
     def dissolve(self) -> None:
@@ -118,14 +115,7 @@ class Region(Protocol):
         """Let each member's barriers say what it waits for."""
 
 
-class Timer(Protocol):
-    """A call that has not happened yet."""
-
-    def cancel(self) -> None:
-        """Forget it."""
-
-
-class Host(Protocol):
+class Host(Protocol[NodeT]):
     """What the deciding part of the engine needs from the waiting part."""
 
     def now(self) -> float:
@@ -146,7 +136,7 @@ class Host(Protocol):
     def soon(self, callback: Callable[[], None]) -> None:
         """Call back at the loop's next pass."""
 
-    def start_task(self, worker: Worker, coroutine: Coroutine[Any, Any, Any], doing: Doing | None = None) -> None:
+    def start_task(self, worker: NodeT, coroutine: Coroutine[Any, Any, Any], doing: Doing[NodeT] | None = None) -> None:
         """Start a task, a child of the node: its code has asked for it, or it is the node's do-activity (A15)."""
 
     def on_loop(self) -> bool:
@@ -162,12 +152,12 @@ class Host(Protocol):
         """Give an event the run's scheduler and thread."""
 
 
-class Code(Protocol):
+class Code(Protocol[NodeT]):
     """What runs the code of nodes where it belongs."""
 
     def execute(
         self,
-        worker: Worker,
+        worker: NodeT,
         call: Callable[..., Any],
         arguments: tuple[Any, ...],
         done: Callable[[Any, BaseException | None], None],
@@ -176,7 +166,7 @@ class Code(Protocol):
 
     def execute_wave(
         self,
-        workers: Sequence[Worker],
+        workers: Sequence[NodeT],
         call: Callable[..., Any],
         arguments: tuple[Any, ...],
         done: Callable[[Any, BaseException | None], None],
@@ -184,23 +174,23 @@ class Code(Protocol):
         """Run code of several nodes of a thread group, one after the other; `done` follows even if the run is over."""
 
     def execute_aside(
-        self, worker: Worker, call: Callable[..., Any], done: Callable[[Any, BaseException | None], None]
+        self, worker: NodeT, call: Callable[..., Any], done: Callable[[Any, BaseException | None], None]
     ) -> None:
         """Run a hook of activity beside whatever the worker is doing."""
 
     def drive(
-        self, worker: Worker, coroutine: Coroutine[Any, Any, object], done: Callable[[Any, BaseException | None], None]
+        self, worker: NodeT, coroutine: Coroutine[Any, Any, object], done: Callable[[Any, BaseException | None], None]
     ) -> None:
         """Take a coroutine of the worker's code to its end."""
 
     def late(
-        self, worker: Worker, done: Callable[[Any, BaseException | None], None]
+        self, worker: NodeT, done: Callable[[Any, BaseException | None], None]
     ) -> Callable[[Any, BaseException | None], None]:
         """What to call when code that waited is over."""
 
     def execute_beside(
         self,
-        flight: Flight,
+        flight: Flight[NodeT],
         call: Callable[..., Any],
         arguments: tuple[Any, ...],
         done: Callable[[Any, BaseException | None], None],
@@ -209,31 +199,33 @@ class Code(Protocol):
 
     def drive_beside(
         self,
-        flight: Flight,
+        flight: Flight[NodeT],
         coroutine: Coroutine[Any, Any, Any],
         done: Callable[[Any, BaseException | None], None],
     ) -> None:
         """Take a coroutine of the firing's code to its end."""
 
-    def interrupt_beside(self, flight: Flight) -> None:
+    def interrupt_beside(self, flight: Flight[NodeT]) -> None:
         """Cancel or abandon the code of the firing (X2)."""
 
-    def interrupt(self, worker: Worker) -> None:
+    def interrupt(self, worker: NodeT) -> None:
         """Cancel or abandon the code of the worker that is under way (X2)."""
 
-    async def trigger_wait(self, event: RunningEvent, value: object, activity: int | None, stamp: float | None) -> None:
+    async def trigger_wait(
+        self, event: RunningEvent[NodeT], value: object, activity: int | None, stamp: float | None
+    ) -> None:
         """Trigger an event, then wait until no `wait` queue behind the events of its node is full (F8)."""
 
 
-class Upstairs(Protocol):
+class Upstairs(Protocol[NodeT]):
     """What modules further up do when those below come to it, so that imports go down only."""
 
-    def idle_again(self, worker: Worker) -> None:
+    def idle_again(self, worker: NodeT) -> None:
         """What kept a worker busy is over."""
 
     def fail(
         self,
-        worker: Worker,
+        worker: NodeT,
         what: str,
         error: BaseException,
         *,
@@ -245,49 +237,49 @@ class Upstairs(Protocol):
         Where no answer is owed, `then` comes before the node is disabled or restarted.
         """
 
-    def fail_call(self, worker: Worker, slot: str, error: BaseException) -> None:
+    def fail_call(self, worker: NodeT, slot: str, error: BaseException) -> None:
         """X1: a slot call has failed."""
 
     def operator_failed(self, edge: EventEdge, error: BaseException) -> None:
         """An operator on an edge raised."""
 
     def begin_beside(
-        self, worker: Worker, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
+        self, worker: NodeT, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
     ) -> None:
         """F14: a firing that has taken its tokens goes on beside others; `refused`: it fails (P8)."""
 
-    def land(self, worker: Worker) -> None:
+    def land(self, worker: NodeT) -> None:
         """F14: the outputs are free: firings that are over may leave."""
 
-    def send_end(self, worker: Worker) -> None:
+    def send_end(self, worker: NodeT) -> None:
         """END is to follow, and the outputs are free (F4)."""
 
-    def node_ended(self, worker: Worker) -> None:
+    def node_ended(self, worker: NodeT) -> None:
         """A node has sent END (P9, R5)."""
 
-    def activity_changed(self, worker: Worker, active: bool) -> None:
+    def activity_changed(self, worker: NodeT, active: bool) -> None:
         """A(v) of a watched node has changed (A9, A11, A12, G2)."""
 
-    def scopes_changed(self, core: Core) -> None:
+    def scopes_changed(self, core: Core[NodeT]) -> None:
         """What subgraphs derive their activity from has changed (G2)."""
 
-    def deactivate_inside(self, scope: Scope, cause: Literal["sent", "slot"]) -> None:
+    def deactivate_inside(self, scope: Scope[NodeT], cause: Literal["sent", "slot"]) -> None:
         """Activity leaves everything inside a subgraph (G2)."""
 
-    def rewire(self, worker: Worker) -> None:
+    def rewire(self, worker: NodeT) -> None:
         """What a worker waits for has changed."""
 
-    def choose_step(self, worker: Worker) -> None:
+    def choose_step(self, worker: NodeT) -> None:
         """The wiring of a worker has changed: its shortest way may be another."""
 
-    def bind_ports(self, worker: Worker) -> None:
+    def bind_ports(self, worker: NodeT) -> None:
         """A node is about to be set up: its ports lead into the run."""
 
-    def iterate(self, worker: Worker, arguments: Sequence[Any]) -> None:
+    def iterate(self, worker: NodeT, arguments: Sequence[Any]) -> None:
         """A subgraph that iterates fires (G4)."""
 
 
-class Core:
+class Core(Generic[NodeT]):
     """One run.
 
     Attributes:
@@ -303,9 +295,9 @@ class Core:
       current: the worker whose code runs on the loop, for the watchdog.
     """
 
-    def __init__(self, host: Host, upstairs: Upstairs) -> None:
+    def __init__(self, host: Host[NodeT], upstairs: Upstairs[NodeT]) -> None:
         self.host = host
-        self.code: Code
+        self.code: Code[NodeT]
         self.upstairs = upstairs
         self.now = host.now
         self.trace: Callable[[TraceEvent], None] | None = None
@@ -317,7 +309,7 @@ class Core:
         self.fuse_after = 250  # firings of a head before its region is formed: forming costs as much as they save
         self.started = False
         self.over = False
-        self.recall: Callable[[Worker], None] | None = None  # gives a node back the state that was kept of it
+        self.recall: Callable[[NodeT], None] | None = None  # gives a node back the state that was kept of it
         self.held = False  # the run is paused: nodes move one by one
         self.errors: list[HfgError] = []
         self.overgrown: list[EventEdge] = []  # queues that F8 has enlarged so often that their ring is reported
@@ -325,35 +317,35 @@ class Core:
         self._has_no_plan()
         self._has_nothing_under_way()
 
-    def recall_with(self, recall: Callable[[Worker], None] | None) -> None:
+    def recall_with(self, recall: Callable[[NodeT], None] | None) -> None:
         """Let nodes get back, before they are set up, the state that was kept of them; None: no more."""
         self.recall = recall
 
     def _has_no_plan(self) -> None:
-        self.workers: list[Worker] = []
+        self.workers: list[NodeT] = []
         self._numbers = itertools.count()
         self.edges: list[SyncEdge | BufferEdge | EventEdge] = []
-        self.scopes: list[Scope] = []
-        self.gates: list[Gate] = []
-        self.by_path: dict[str, Worker] = {}
-        self.boundary: Worker | None = None
-        self.sources: list[Worker] = []
-        self.feeds: list[Worker] = []  # the graph's own inputs (P10)
-        self.readers: list[Worker] = []  # the graph's own outputs
-        self.outlets: list[Worker] = []  # where edges leave for another part of a graph that is cut (L1)
-        self.inlets: list[Worker] = []  # where they come in
+        self.scopes: list[Scope[NodeT]] = []
+        self.gates: list[Gate[NodeT]] = []
+        self.by_path: dict[str, NodeT] = {}
+        self.boundary: NodeT | None = None
+        self.sources: list[NodeT] = []
+        self.feeds: list[NodeT] = []  # the graph's own inputs (P10)
+        self.readers: list[NodeT] = []  # the graph's own outputs
+        self.outlets: list[NodeT] = []  # where edges leave for another part of a graph that is cut (L1)
+        self.inlets: list[NodeT] = []  # where they come in
         self.piped: list[tuple[Any, tuple[Any, ...]]] = []  # edges with operators (P9)
         self.outside: dict[tuple[int, str], Any] = {}  # edges by which signals come from outside the graph
         self.observables: list[tuple[Any, Any, tuple[Any, ...]]] = []  # outside sources of edges
         self.listeners: dict[Any, None] = {}  # outputs to slots, perhaps ahead of the edges' counts
-        self.regions: set[Region] = set()  # fused, and perhaps ahead of the counts of their members
+        self.regions: set[Region[NodeT]] = set()  # fused, and perhaps ahead of the counts of their members
 
     def _has_nothing_under_way(self) -> None:
         self.in_flight = 0
         self.tasks = 0
-        self.iterating: list[Iteration] = []  # subgraphs amid a firing in which they iterate, inner ones behind (G4)
+        self.iterating: list[Iteration[NodeT]] = []  # subgraphs amid such a firing, inner ones behind (G4)
         self.full_edges = 0  # queues that hold their sources back (F8)
-        self.suspects: dict[Worker, None] = {}  # held back so, and perhaps in a ring that has closed
+        self.suspects: dict[NodeT, None] = {}  # held back so, and perhaps in a ring that has closed
         self.all_suspect = False
         self.waiting_room = 0  # of those, how much code awaits trigger_wait (F8)
         self.timers = 0
@@ -362,18 +354,18 @@ class Core:
         self.until = 0.0  # on the run's clock: the pump's slice is over
         self.ready_groups: deque[Any] = deque()  # those beside the loop's own in which something can move
         self.flags = Flags()  # of the pump and of the waves on the loop; not empty: these end behind the call under way
-        self.futile: set[Worker] = set()  # sources that feed only ended nodes (R5)
-        self.current: Worker | None = None
-        self.speaker: Worker | None = None  # whose code a fast path runs: what it triggers may take one too
+        self.futile: set[NodeT] = set()  # sources that feed only ended nodes (R5)
+        self.current: NodeT | None = None
+        self.speaker: NodeT | None = None  # whose code a fast path runs: what it triggers may take one too
         self.holding: Any = None  # what holds nodes for an edit (R4)
-        self.followers: list[Worker] = []  # enabled by the sending under way, and to go next (R2)
+        self.followers: list[NodeT] = []  # enabled by the sending under way, and to go next (R2)
         self.followed = 0  # how many have gone so; the pump counts waves, not hops, where time is virtual
-        self.dirty_scopes: list[Scope] = []
-        self.late: list[Worker] | None = None  # those whose automatic events are told behind the change under way
+        self.dirty_scopes: list[Scope[NodeT]] = []
+        self.late: list[NodeT] | None = None  # those whose automatic events are told behind the change under way
         self.returned: list[EventEdge] = []  # whose +1 of the sending under way goes back to the sender (F13, A8)
         self.heard: deque[tuple[Any, Token[Any]]] = deque()  # signals of which subscribers are to hear (F3)
         self.telling = False  # they are hearing
-        self.drained: list[tuple[Worker, int]] = []  # modifiers of the sending under way that act behind it (T4, F12)
+        self.drained: list[tuple[NodeT, int]] = []  # modifiers of the sending under way that act behind it (T4, F12)
 
     def ends_slice(self) -> bool:
         """Whether a flag is up that is not for the wave alone that has ended by it: the pump is to look round."""
@@ -391,49 +383,6 @@ class Core:
         for region in self.regions:
             if not region.running:
                 region.disarm()
-
-    def check_invariants(self) -> None:
-        """Between two steps of the run certain things hold of all of it: nodes, edges, regions, and between them.
-
-        Raises:
-          EngineInternalError: one of them does not.
-        """
-        if self.over:
-            return
-        self._check_workers()
-        for region in self.regions:
-            region.check_invariants()
-        self._check_queues()
-        if self.followers or self.returned or self.drained or self.late is not None:
-            raise EngineInternalError("a sending is not over: who follows, or what was returned or drained, is left")
-        for scope in self.scopes:
-            if scope.watched and scope not in self.dirty_scopes and scope.active != scope.derive():
-                raise EngineInternalError(f'subgraph "{scope.path}": its activity is not that of its inside (G2)')
-
-    def _check_workers(self) -> None:
-        """What lies on the edges is what the nodes at their ends have counted."""
-        held: Counter[Worker] = Counter()
-        full: Counter[Worker] = Counter()
-        for edge in self.edges:
-            edge.check_invariants()
-            if isinstance(edge, EventEdge):
-                full[edge.source] += edge.full
-            else:
-                held[edge.waits] += edge.held
-        for worker in self.workers:
-            worker.check_invariants()
-            worker.outputs.check_invariants(held[worker], f'outputs of "{worker.path}"')
-            if worker.full_edges != full[worker]:
-                raise EngineInternalError(f'node "{worker.path}": {full[worker]} of its queues are full (F8)')
-            if worker.region is not None and worker.region not in self.regions:
-                raise EngineInternalError(f'node "{worker.path}": its region is gone')
-
-    def _check_queues(self) -> None:
-        """Who is queued stands in the run queue of its group, once, and nobody else does."""
-        standing = Counter(worker for group in {worker.group for worker in self.workers} for worker in group.policy)
-        for worker in self.workers:
-            if standing[worker] != worker.queued:
-                raise EngineInternalError(f'node "{worker.path}": it stands {standing[worker]} times in its run queue')
 
     def waits_changed(self) -> None:
         """F8: who may wait for whom is not as it was, so any node that a full queue holds back may be in a ring now."""

@@ -9,19 +9,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextvars import ContextVar
-from typing import TYPE_CHECKING, Any
+from typing import Any, Generic, TypeAlias
 
+from hfg.engine.model.contracts import NodeT, Timer
 from hfg.errors import EngineInternalError, NodeError
 
-if TYPE_CHECKING:
-    from hfg.engine.model.core import Timer
-    from hfg.engine.model.worker import Entry, Worker
+__all__ = ["Attempts", "Entry", "Flight", "Flights"]
 
-__all__ = ["Attempts", "Flight", "Flights", "current_flight"]
-
-current_flight: ContextVar[Flight | None] = ContextVar("hfg.flight", default=None)
-"""Whose code runs: set around the code of each firing that goes on beside others."""
+Entry: TypeAlias = "tuple[Any, int | None, float | None]"  # what is written to an output: value, modifier, stamp
 
 
 class Attempts:
@@ -76,7 +71,7 @@ class Attempts:
             timer.cancel()
 
 
-class Flight:
+class Flight(Generic[NodeT]):
     """One firing that is under way beside others.
 
     Attributes:
@@ -113,7 +108,7 @@ class Flight:
         "written",
     )
 
-    def __init__(self, worker: Worker, number: int, stamp: float) -> None:
+    def __init__(self, worker: NodeT, number: int, stamp: float) -> None:
         self.worker = worker
         self.number = number
         self.stamp = stamp
@@ -198,7 +193,7 @@ class Flight:
         self.answers = answers
 
 
-class Flights:
+class Flights(Generic[NodeT]):
     """The firings of one node that are under way, in the order in which they began.
 
     Attributes:
@@ -234,14 +229,16 @@ class Flights:
         self.end_number = 0
         self.end_written: list[Any] | None = None
         self.idle: list[Any] = []
-        self._under_way: dict[Flight, None] = {}
-        self._over: deque[Flight] = deque()  # in the order in which they came to that; not used where they are ordered
+        self._under_way: dict[Flight[NodeT], None] = {}
+        self._over: deque[Flight[NodeT]] = (
+            deque()
+        )  # in the order in which they came to that; not used where they are ordered
         self._on_rest: list[Callable[[], None]] = []
 
     def __len__(self) -> int:
         return len(self._under_way)
 
-    def __iter__(self) -> Iterator[Flight]:
+    def __iter__(self) -> Iterator[Flight[NodeT]]:
         return iter(list(self._under_way))
 
     @property
@@ -259,17 +256,17 @@ class Flights:
         """Of how many the code waits or runs in a thread."""
         return sum(flight.working for flight in self._under_way)
 
-    def begin(self, flight: Flight) -> None:
+    def begin(self, flight: Flight[NodeT]) -> None:
         """One more is under way."""
         self._under_way[flight] = None
         self.most = max(self.most, len(self._under_way))
 
-    def over(self, flight: Flight) -> None:
+    def over(self, flight: Flight[NodeT]) -> None:
         """One of them has come to its end."""
         if not self.ordered:
             self._over.append(flight)
 
-    def next_to_leave(self, *, to_nobody: bool) -> Flight | None:
+    def next_to_leave(self, *, to_nobody: bool) -> Flight[NodeT] | None:
         """Whose turn it is to send what it has, if there is one; what goes to nobody waits for no turn (F10)."""
         if to_nobody:
             return next((flight for flight in self._under_way if flight.outcome), None)
@@ -278,7 +275,7 @@ class Flights:
         first = next(iter(self._under_way), None)
         return first if first is not None and first.outcome else None
 
-    def leave(self, flight: Flight) -> None:
+    def leave(self, flight: Flight[NodeT]) -> None:
         """It has sent what it had."""
         del self._under_way[flight]
         if not self.ordered:
@@ -288,7 +285,7 @@ class Flights:
         """Who sends now, and by that frees its outputs, goes on with the next by itself."""
         self.leaving = leaving
 
-    def forget(self, flight: Flight) -> None:
+    def forget(self, flight: Flight[NodeT]) -> None:
         """It has nothing to send: a source has found its end."""
         del self._under_way[flight]
 

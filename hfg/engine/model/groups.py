@@ -7,18 +7,38 @@ What the deciding modules see of it; how the loop or a thread takes from the que
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator
+from typing import Any, Generic, Protocol
 
-from hfg.engine.model.policies import FairShare, Fifo, Policy
+from hfg.engine.model.contracts import NodeT
 
-if TYPE_CHECKING:
-    from hfg.engine.model.worker import Worker
-
-__all__ = ["Group"]
+__all__ = ["Group", "Policy"]
 
 
-class Group:
+class Policy(Protocol[NodeT]):
+    """Which of the workers that can move is next (R2).
+
+    A worker stands in it at most once. `push` is called when it can move, `pop` only while there are any. Two more
+    methods may be there: `push_next(worker)`, where what a firing enables goes before all others, and
+    `charge(worker, busy_s)`, where a turn's time matters.
+    """
+
+    def push(self, worker: NodeT) -> None:
+        """Take in a worker that can move."""
+
+    def pop(self) -> NodeT:
+        """Give out the next one."""
+
+    def remove(self, worker: NodeT) -> None:
+        """Take out one that stands in it."""
+
+    def __iter__(self) -> Iterator[NodeT]:
+        """Go through those that stand in it, the next ones first as far as that is known."""
+
+    def __len__(self) -> int: ...
+
+
+class Group(Generic[NodeT]):
     """Nodes that never run at the same time, unless they have several threads.
 
     Attributes:
@@ -34,19 +54,20 @@ class Group:
     threaded = False
     several = False  # it has more than one thread
 
-    def __init__(self, name: str, policy: Policy, clock: Callable[[], float]) -> None:
+    def __init__(self, name: str, policy: Policy[NodeT], clock: Callable[[], float]) -> None:
         self.name = name
         self.policy = policy
-        self.push: Callable[[Worker], None] = policy.push
-        self.depth_first = isinstance(policy, Fifo)  # what a firing enables goes next (R2)
-        self.push_next: Callable[[Worker], None] = policy.push_next if isinstance(policy, Fifo) else policy.push
-        self.take: Callable[[], Any] = policy.popleft if isinstance(policy, Fifo) else policy.pop
-        self.fair = policy if isinstance(policy, FairShare) else None
+        self.push: Callable[[NodeT], None] = policy.push
+        push_next: Callable[[NodeT], None] | None = getattr(policy, "push_next", None)
+        self.depth_first = push_next is not None  # what a firing enables goes next (R2)
+        self.push_next: Callable[[NodeT], None] = push_next or policy.push
+        self.take: Callable[[], NodeT] = policy.pop
+        self.charges: Callable[[NodeT, float], None] | None = getattr(policy, "charge", None)
         self.clock = clock  # read only where time is shared
         self.held = False
         self.in_a_row = False
         self.turns = 1
-        self.signal_step: Callable[[Worker], None] | None = None
+        self.signal_step: Callable[[NodeT], None] | None = None
 
     def hold(self, held: bool) -> None:
         """R3: whether nobody of it moves, for the run is paused."""
@@ -70,7 +91,7 @@ class Group:
         """Whether its threads are all at work, so that nobody of it can move."""
         return False
 
-    def charge(self, worker: Worker, busy_s: float) -> None:
+    def charge(self, worker: NodeT, busy_s: float) -> None:
         """A worker has kept the group busy for so long."""
-        if self.fair is not None:
-            self.fair.charge(worker, busy_s)
+        if self.charges is not None:
+            self.charges(worker, busy_s)

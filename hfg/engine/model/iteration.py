@@ -2,21 +2,20 @@
 
 The nodes inside are workers of the same run as all others. What is special is the border alone: it lets the next
 element in when nothing inside moves any more by itself, and keeps what comes out. Plain state, decided over by
-`rules.iterating`. Stands on `worker`.
+`rules.iterating`. Stands on nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, Generic
 
-if TYPE_CHECKING:
-    from hfg.engine.model.worker import Worker
+from hfg.engine.model.contracts import Node, NodeT
 
 __all__ = ["Iteration", "amid_element"]
 
 
-class Iteration:
+class Iteration(Generic[NodeT]):
     """The border of one subgraph that iterates.
 
     Attributes:
@@ -42,11 +41,11 @@ class Iteration:
         "worker",
     )
 
-    def __init__(self, worker: Worker) -> None:
+    def __init__(self, worker: NodeT) -> None:
         self.worker = worker
-        self.members: list[Worker] = []
-        self.feeds: list[Worker] = []
-        self.readers: list[Worker] = []
+        self.members: list[NodeT] = []
+        self.feeds: list[NodeT] = []
+        self.readers: list[NodeT] = []
         self.count: int | None = None
         self.position = 0
         self._columns: dict[str, list[Any]] = {}
@@ -57,12 +56,12 @@ class Iteration:
 
     # --- who is inside ---
 
-    def join(self, worker: Worker) -> None:
+    def join(self, worker: NodeT) -> None:
         """Somebody is inside from now on."""
         worker.lie_within(self)
         self.members.append(worker)
 
-    def leave(self, worker: Worker) -> None:
+    def leave(self, worker: NodeT) -> None:
         """Somebody is not any more."""
         self.members.remove(worker)
 
@@ -147,7 +146,7 @@ class Iteration:
         return results
 
 
-def amid_element(worker: Worker) -> str:
+def amid_element(worker: Node) -> str:
     """Say which element a node inside of what iterates works on, as the end of a phrase; nothing for others."""
     said = ""
     around = worker.within

@@ -12,8 +12,9 @@ import random
 from collections import deque
 from collections.abc import Callable, Iterator
 from math import inf
-from typing import Any, Protocol
+from typing import Any
 
+from hfg.engine.model.groups import Policy
 from hfg.engine.model.worker import Worker
 from hfg.errors import UsageError
 
@@ -22,32 +23,10 @@ __all__ = [
     "EarliestDeadline",
     "FairShare",
     "Fifo",
-    "Policy",
     "Priority",
     "SeededRandom",
     "make_policy",
 ]
-
-
-class Policy(Protocol):
-    """Which of the workers that can move is next (R2).
-
-    A worker stands in it at most once. `push` is called when it can move, `pop` only while there are any.
-    """
-
-    def push(self, worker: Worker) -> None:
-        """Take in a worker that can move."""
-
-    def pop(self) -> Worker:
-        """Give out the next one."""
-
-    def remove(self, worker: Worker) -> None:
-        """Take out one that stands in it."""
-
-    def __iter__(self) -> Iterator[Worker]:
-        """Go through those that stand in it, the next ones first as far as that is known."""
-
-    def __len__(self) -> int: ...
 
 
 class Fifo(deque[Worker]):
@@ -180,7 +159,7 @@ class SeededRandom:
         return len(self._workers)
 
 
-POLICIES: dict[str, Callable[[int | None], Policy]] = {
+POLICIES: dict[str, Callable[[int | None], Policy[Worker]]] = {
     "fifo": lambda seed: Fifo(),
     "priority": lambda seed: Priority(),
     "deadline": lambda seed: EarliestDeadline(),
@@ -189,7 +168,7 @@ POLICIES: dict[str, Callable[[int | None], Policy]] = {
 }
 
 
-def make_policy(name: str, seed: int | None) -> Policy:
+def make_policy(name: str, seed: int | None) -> Policy[Worker]:
     """Make a run queue.
 
     Raises:

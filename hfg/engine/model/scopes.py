@@ -1,21 +1,20 @@
 """Subgraphs at run time (rule G2) and gates (rule A11): what depends on the activity of something else.
 
 A scope is a dissolved subgraph that somebody watches: it has an automatic event with an edge, `active_for_s`, or
-gates a node. Its activity is derived, never stored by a token. Stands on `worker`.
+gates a node. Its activity is derived, never stored by a token. Stands on nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any, Generic
 
-if TYPE_CHECKING:
-    from hfg.engine.model.worker import Worker
+from hfg.engine.model.contracts import NodeT
 
 __all__ = ["Gate", "Scope"]
 
 
-class Scope:
+class Scope(Generic[NodeT]):
     """A subgraph whose activity matters.
 
     Attributes:
@@ -42,33 +41,33 @@ class Scope:
         "worker",
     )
 
-    def __init__(self, index: float, path: str, parent: Scope | None, *, enabled: bool = True) -> None:
+    def __init__(self, index: float, path: str, parent: Scope[NodeT] | None, *, enabled: bool = True) -> None:
         self.index = index
         self.path = path
         self.parent = parent
-        self.members: list[Worker] = []
-        self.children: list[Scope] = []
+        self.members: list[NodeT] = []
+        self.children: list[Scope[NodeT]] = []
         if parent is not None:
             parent.children.append(self)
         self.inner_edges: list[Any] = []
-        self.worker: Worker | None = None
+        self.worker: NodeT | None = None
         self.active = False
         self.told = False
         self.enabled = enabled
         self.watched = False
-        self.gates: list[Gate] = []
+        self.gates: list[Gate[NodeT]] = []
 
-    def be_told_by(self, worker: Worker) -> None:
+    def be_told_by(self, worker: NodeT) -> None:
         """Its automatic ports live there."""
         self.worker = worker
 
-    def take_in(self, members: Iterable[Worker]) -> None:
+    def take_in(self, members: Iterable[NodeT]) -> None:
         """These running nodes are inside, and know it."""
         self.members = list(members)
         for member in self.members:
             member.lie_in((*member.around, self))
 
-    def move(self, path: str, parent: Scope | None) -> None:
+    def move(self, path: str, parent: Scope[NodeT] | None) -> None:
         """It is called otherwise, and lies elsewhere, as the last one inside of that."""
         self.path = path
         self.parent = parent
@@ -87,11 +86,11 @@ class Scope:
         """No gate looks at its activity."""
         self.gates = []
 
-    def and_around(self) -> tuple[Scope, ...]:
+    def and_around(self) -> tuple[Scope[NodeT], ...]:
         """Give it and those around it, outermost first."""
         return (*(self.parent.and_around() if self.parent is not None else ()), self)
 
-    def inside(self) -> list[Worker]:
+    def inside(self) -> list[NodeT]:
         """Give the workers of all nodes and subgraphs inside."""
         assert self.worker is not None
         found = list(self.members)
@@ -137,7 +136,7 @@ class Scope:
         )
 
 
-class Gate:
+class Gate(Generic[NodeT]):
     """Work coupled to the activity of a state node or subgraph (A11).
 
     Attributes:
@@ -148,7 +147,7 @@ class Gate:
 
     __slots__ = ("idle_rate_hz", "state", "workers")
 
-    def __init__(self, state: Worker | Scope, idle_rate_hz: float | None, workers: Iterable[Worker]) -> None:
+    def __init__(self, state: NodeT | Scope[NodeT], idle_rate_hz: float | None, workers: Iterable[NodeT]) -> None:
         self.state = state
         self.idle_rate_hz = idle_rate_hz
         self.workers = list(workers)

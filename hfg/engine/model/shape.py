@@ -2,15 +2,60 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
 
+from hfg.graph.structure.options import NodeOptions
 from hfg.ports.automatic import sent_name
 from hfg.ports.edges import EventEdge, SyncEdge
 
-if TYPE_CHECKING:
-    from hfg.engine.model.vertex import Vertex
-
 __all__ = ["Shape"]
+
+
+class _Run(Protocol):
+    debug: bool
+
+
+class _Vertex(Protocol):
+    """What the shape follows from."""
+
+    type: Any
+
+    @property
+    def core(self) -> _Run: ...
+
+    @property
+    def process(self) -> object: ...
+
+    @property
+    def options(self) -> NodeOptions | None: ...
+
+    @property
+    def events(self) -> Mapping[str, object]: ...
+
+    @property
+    def in_edges(self) -> tuple[Any, ...]: ...
+
+    @property
+    def live_inputs(self) -> tuple[Any, ...]: ...
+
+    @property
+    def out_edges(self) -> tuple[tuple[Any, ...], ...]: ...
+
+    @property
+    def gates_over(self) -> Sequence[object]: ...
+
+    @property
+    def paced(self) -> bool: ...
+
+    @property
+    def iteration(self) -> object: ...
+
+    @property
+    def unset(self) -> Sequence[object]: ...
+
+    @property
+    def wants_token(self) -> Sequence[bool]: ...
 
 
 class Shape:
@@ -30,7 +75,7 @@ class Shape:
 
     __slots__ = ("announced", "direct", "gives", "outgoing", "pipelined", "plain", "remembers", "sequential", "single")
 
-    def __init__(self, vertex: Vertex) -> None:
+    def __init__(self, vertex: _Vertex) -> None:
         synchronous = [edge for edge in vertex.live_inputs if type(edge) is not EventEdge]
         self.sequential = tuple(edge for edge in synchronous if edge.sequential)
         self.pipelined = tuple(edge for edge in synchronous if not edge.sequential)
@@ -44,14 +89,14 @@ class Shape:
         self.gives = any(edge.active for edge in outgoing)
 
 
-def _announced(vertex: Vertex) -> tuple[tuple[str, int | None], ...]:
+def _announced(vertex: _Vertex) -> tuple[tuple[str, int | None], ...]:
     """A9: nothing, as long as nobody asks."""
     outputs = () if vertex.type is None else enumerate(vertex.type.outputs)
     sent = [(sent_name(output), position) for position, output in outputs if sent_name(output) in vertex.events]
     return (*sent, ("processed", None)) if "processed" in vertex.events else tuple(sent)
 
 
-def _is_plain(vertex: Vertex) -> bool:
+def _is_plain(vertex: _Vertex) -> bool:
     if vertex.type is None or vertex.process is None or vertex.gates_over or vertex.paced or vertex.core.debug:
         return False
     if vertex.options is not None and (vertex.options.concurrency > 1 or vertex.options.retries):
@@ -61,7 +106,7 @@ def _is_plain(vertex: Vertex) -> bool:
     )
 
 
-def _is_direct(vertex: Vertex) -> bool:
+def _is_direct(vertex: _Vertex) -> bool:
     return (
         vertex.iteration is None
         and vertex.type.process_kind in ("function", "async")
@@ -70,6 +115,6 @@ def _is_direct(vertex: Vertex) -> bool:
     )
 
 
-def _is_single(vertex: Vertex) -> bool:
+def _is_single(vertex: _Vertex) -> bool:
     kind = vertex.type
     return kind is not None and kind.result == "single" and len(vertex.out_edges) == 1 and not vertex.core.debug

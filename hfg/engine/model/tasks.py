@@ -7,18 +7,15 @@ them go on is `executing.tasks`, and both exist only where somebody has started 
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
-from contextvars import ContextVar
-from typing import TYPE_CHECKING, Any
+from typing import Any, Generic
 
+from hfg.engine.model.contracts import NodeT
 from hfg.errors import NodeError
 
-if TYPE_CHECKING:
-    from hfg.engine.model.worker import Worker
-
-__all__ = ["Doing", "Task", "Tasks", "current_task"]
+__all__ = ["Doing", "Task", "Tasks"]
 
 
-class Task:
+class Task(Generic[NodeT]):
     """One of them.
 
     Attributes:
@@ -33,7 +30,7 @@ class Task:
     __slots__ = ("cancelled", "carrier", "coroutine", "doing", "name", "worker")
 
     def __init__(
-        self, worker: Worker, name: str, coroutine: Coroutine[Any, Any, Any], doing: Doing | None = None
+        self, worker: NodeT, name: str, coroutine: Coroutine[Any, Any, Any], doing: Doing[NodeT] | None = None
     ) -> None:
         self.worker = worker
         self.doing = doing
@@ -62,7 +59,7 @@ class Task:
             self.carrier.cancel()
 
 
-class Doing:
+class Doing(Generic[NodeT]):
     """The do-activity of one node (A15): never two at once.
 
     Attributes:
@@ -74,7 +71,7 @@ class Doing:
     __slots__ = ("due", "entering", "task")
 
     def __init__(self) -> None:
-        self.task: Task | None = None
+        self.task: Task[NodeT] | None = None
         self.due = False
         self.entering = 0
 
@@ -101,7 +98,7 @@ class Doing:
         """Whether it is to begin, as far as it knows itself."""
         return self.due and not self.entering and self.task is None
 
-    def begin(self, task: Task) -> None:
+    def begin(self, task: Task[NodeT]) -> None:
         """It has begun."""
         self.due = False
         self.task = task
@@ -111,11 +108,7 @@ class Doing:
         self.task = None
 
 
-current_task: ContextVar[Task | None] = ContextVar("hfg.task", default=None)
-"""Whose code runs, if it is that of a task; also in the tasks that it starts by itself."""
-
-
-class Tasks:
+class Tasks(Generic[NodeT]):
     """Those of one node that are under way.
 
     Attributes:
@@ -126,13 +119,13 @@ class Tasks:
 
     __slots__ = ("_on_rest", "_under_way", "_worker", "doing", "problems", "waiting_room")
 
-    def __init__(self, worker: Worker) -> None:
+    def __init__(self, worker: NodeT) -> None:
         self._worker = worker
-        self._under_way: dict[Task, None] = {}
+        self._under_way: dict[Task[NodeT], None] = {}
         self._on_rest: list[Callable[[], None]] = []
         self.waiting_room = 0
         self.problems: list[NodeError] = []
-        self.doing = Doing()
+        self.doing: Doing[NodeT] = Doing()
 
     def __len__(self) -> int:
         return len(self._under_way)
@@ -152,12 +145,12 @@ class Tasks:
         """Whether somebody waits until all of them have ended."""
         return bool(self._on_rest)
 
-    def begin(self, task: Task) -> None:
+    def begin(self, task: Task[NodeT]) -> None:
         """One more."""
         self._under_way[task] = None
         self._worker.core.tasks += 1
 
-    def over(self, task: Task) -> None:
+    def over(self, task: Task[NodeT]) -> None:
         """One less; behind the last one those have their turn who wait for that."""
         del self._under_way[task]
         self._worker.core.tasks -= 1

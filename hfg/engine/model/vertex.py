@@ -1,30 +1,28 @@
 """What a plan says of one node: whose code it is, and which edges lead into it and out of it (V of eq. 6, rule G1).
 
 Structure alone. It is written when the plan is made, when something is enabled or disabled, and by an edit, never by a
-firing; what happens there while the graph runs is in `worker`. Stands on floors 0-4.
+firing; what happens there while the graph runs is in `worker`. Stands on `core`, `groups`, `scopes` and `iteration`.
 """
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, Generic
 
+from hfg.engine.model.contracts import NodeT
+from hfg.engine.model.core import Core
+from hfg.engine.model.events import RunningEvent
+from hfg.engine.model.groups import Group
+from hfg.engine.model.iteration import Iteration
+from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.shape import Shape
 from hfg.graph.structure.options import NodeOptions
 from hfg.nodetypes.node import Node, NodeType
 from hfg.ports.automatic import AUTOMATIC_EVENTS, sent_of
 from hfg.ports.edges import Edge
-from hfg.ports.events import EventPort
 
-if TYPE_CHECKING:
-    from hfg.engine.model.core import Core
-    from hfg.engine.model.groups import Group
-    from hfg.engine.model.iteration import Iteration
-    from hfg.engine.model.scopes import Gate, Scope
-    from hfg.engine.model.worker import Worker
-
-__all__ = ["RunningEvent", "Vertex", "slots_first"]
+__all__ = ["Vertex"]
 
 NOTHING: Final[dict[str, Any]] = {}  # shared by the many that have none; never written
 
@@ -35,38 +33,7 @@ _Shared = tuple[tuple[Any, ...], tuple[bool, ...], tuple[str, ...], tuple[str, .
 _shared: dict[NodeType, _Shared] = {}
 
 
-def slots_first(edge: Edge) -> tuple[bool, float]:
-    """The order in which the signals of an event leave (F9)."""
-    return (edge.target_kind == "input", edge.index)
-
-
-class RunningEvent:
-    """An event of a running node and the edges it feeds, slots first (F9)."""
-
-    __slots__ = ("edges", "name", "pipelines", "port", "tap", "worker")
-
-    def __init__(self, worker: Worker, name: str, port: EventPort[Any] | None) -> None:
-        self.worker = worker
-        self.name = name
-        self.port: Any = port
-        self.edges: tuple[Any, ...] = ()
-        self.tap: tuple[Any, ...] | None = None  # who looks at its signals; () if at one of its edges only
-
-    @property
-    def label(self) -> str:
-        """Its path, as traces name it."""
-        return f"{self.worker.path}.{self.name}" if self.worker.path else self.name
-
-    def bind(self, port: EventPort[Any]) -> None:
-        """By this port it is triggered, and heard."""
-        self.port = port
-
-    def feed(self, edges: Iterator[Any] | tuple[Any, ...]) -> None:
-        """It feeds these edges from now on."""
-        self.edges = tuple(sorted(edges, key=slots_first))
-
-
-class Vertex:
+class Vertex(Generic[NodeT]):
     """A node, subgraph or graph port in the plan of a run.
 
     Attributes:
@@ -141,7 +108,9 @@ class Vertex:
         "within",
     )
 
-    def __init__(self, core: Core, path: str, node: Node | None, options: NodeOptions | None, group: Group) -> None:
+    def __init__(
+        self, core: Core[NodeT], path: str, node: Node | None, options: NodeOptions | None, group: Group[NodeT]
+    ) -> None:
         self.core = core
         self.index = core.number_workers()
         self.path = path
@@ -157,11 +126,11 @@ class Vertex:
         self._has_no_edges()
         self.port_name = ""
         self.is_boundary_output = False
-        self.scope: Scope | None = None
-        self.within: Iteration | None = None
-        self.around: tuple[Scope, ...] = ()
-        self.scopes: tuple[Scope, ...] = ()
-        self.gates_over: tuple[Gate, ...] = ()
+        self.scope: Scope[NodeT] | None = None
+        self.within: Iteration[NodeT] | None = None
+        self.around: tuple[Scope[NodeT], ...] = ()
+        self.scopes: tuple[Scope[NodeT], ...] = ()
+        self.gates_over: tuple[Gate[NodeT], ...] = ()
         self.gates: list[Any] = []
         self.watched = False
         self.shape = Shape(self)
@@ -177,7 +146,7 @@ class Vertex:
         self.process: Callable[..., Any] | None = None
         self.ready_hook: Callable[[], Any] | None = None
         self.has_hooks = False
-        self.iteration: Iteration | None = None
+        self.iteration: Iteration[NodeT] | None = None
 
     def _has_no_edges(self) -> None:
         self.in_edges: tuple[Any, ...] = ()
@@ -187,7 +156,7 @@ class Vertex:
         self.plain_handlers: dict[str, Any] = NOTHING
         self.wired_out: tuple[tuple[Any, ...], ...] = ()
         self.out_edges: tuple[tuple[Any, ...], ...] = ()
-        self.events: dict[str, RunningEvent] = {}
+        self.events: dict[str, RunningEvent[NodeT]] = {}
         self.listeners: tuple[Any, ...] = ()
 
     # --- whose code it is -------------------------------------------------------------------------------------------
@@ -223,13 +192,13 @@ class Vertex:
             return False
         return self.is_async or "do" in self.type.hooks or any(slot.is_async for slot in self.type.slots.values())
 
-    def iterate(self, iteration: Iteration) -> None:
+    def iterate(self, iteration: Iteration[NodeT]) -> None:
         """G4: its process function is the inside of a subgraph, which sees the elements one by one."""
         self.iteration = iteration
         self.process = self.core.upstairs.iterate  # to which `firing` comes by itself; without one it would be no node
         self.is_source = False
 
-    def lie_within(self, iteration: Iteration) -> None:
+    def lie_within(self, iteration: Iteration[NodeT]) -> None:
         """G4: the innermost subgraph around it that iterates is this one's."""
         self.within = iteration
 
@@ -254,11 +223,15 @@ class Vertex:
 
     # --- where it is ------------------------------------------------------------------------------------------------
 
-    def join(self, group: Group) -> None:
+    def join(self, group: Group[NodeT]) -> None:
         """Be one of those that never run at the same time."""
         self.group = group
-        self.push: Callable[[Worker], None] = group.push
-        self.push_next: Callable[[Worker], None] = group.push_next
+        self.push: Callable[[NodeT], None] = group.push
+        self.push_next: Callable[[NodeT], None] = group.push_next
+
+    def queue_by(self, push: Callable[[NodeT], None], push_next: Callable[[NodeT], None]) -> None:
+        """By these it gets into the queue of its group, in place of the group's own."""
+        self.push, self.push_next = push, push_next
 
     def rename(self, path: str) -> None:
         """It is called otherwise from now on."""
@@ -273,18 +246,18 @@ class Vertex:
         """These are its options from now on; the group that they name is for `regroup`."""
         self.options = options
 
-    def lie_in(self, around: tuple[Scope, ...]) -> None:
+    def lie_in(self, around: tuple[Scope[NodeT], ...]) -> None:
         """These subgraphs are around it, outermost first."""
         self.around = around
         self.scopes = tuple(scope for scope in around if scope.watched and scope is not self.scope)
 
-    def tell(self, scope: Scope) -> None:
+    def tell(self, scope: Scope[NodeT]) -> None:
         """G2: a subgraph around it is watched from now on."""
         self.scopes += (scope,)
 
     # --- who asks for its activity, or has it asked (A11) -------------------------------------------------------------
 
-    def be_gated(self, gate: Gate) -> None:
+    def be_gated(self, gate: Gate[NodeT]) -> None:
         """It works only while the state of the gate is active."""
         self.gates_over += (gate,)
         self.paced = self.paced or self.is_source
@@ -353,12 +326,12 @@ class Vertex:
         wired[position] = tuple(sorted((*wired[position], edge), key=_by_index))
         self.wired_out = tuple(wired)
 
-    def ask_for(self, event: RunningEvent) -> None:
+    def ask_for(self, event: RunningEvent[NodeT]) -> None:
         """Somebody asks for one of its events: it has an edge, or somebody listens."""
         self.events[event.name] = event
         self.shape = Shape(self)
 
-    def ask_no_more(self, event: RunningEvent) -> None:
+    def ask_no_more(self, event: RunningEvent[NodeT]) -> None:
         """Nobody asks for this event any more."""
         del self.events[event.name]
         self.shape = Shape(self)

@@ -2,29 +2,29 @@
 
 Plain state, decided over by `firing`, `sending` and `quiet`. A worker has at most one firing or call under way; where
 its node allows several firings, those that go on are in its `flights` (F14).
-Stands on floors 0-4.
+Stands on `vertex`.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import Any, Final
 
 from hfg.engine.model.calls import Calls, CallsOfOne
-from hfg.engine.model.flights import Attempts, Flights
-from hfg.engine.model.vertex import RunningEvent, Vertex
+from hfg.engine.model.contracts import Timer
+from hfg.engine.model.core import Core, Region
+from hfg.engine.model.events import RunningEvent
+from hfg.engine.model.flights import Attempts, Entry, Flights
+from hfg.engine.model.groups import Group
+from hfg.engine.model.scopes import Scope
+from hfg.engine.model.vertex import Vertex
 from hfg.errors import EngineInternalError
 from hfg.graph.structure.options import NodeOptions
 from hfg.nodetypes.node import Node
 from hfg.ports.barrier import Barrier
 from hfg.ports.edges import AnyEdge, Edge, EventEdge
 from hfg.ports.events import EventPort
-
-if TYPE_CHECKING:
-    from hfg.engine.model.core import Core, Region, Timer
-    from hfg.engine.model.groups import Group
-    from hfg.engine.model.scopes import Scope
 
 __all__ = [
     "AMID_NOTHING",
@@ -46,7 +46,6 @@ __all__ = [
     "UNREADY",
     "UNWIRED",
     "Entry",
-    "RunningEvent",
     "Worker",
 ]
 
@@ -69,14 +68,12 @@ RECORDED: Final = 8192  # what it sends is recorded without loss, and the disk i
 NO_CALLS: Final = FULL  # the least of them
 FIRES_NO_MORE: Final = ENDED | DISABLED | REMOVED | TORN_DOWN | UNWIRED | FUTILE  # whatever comes to it
 
-Entry: TypeAlias = "tuple[Any, int | None, float | None]"  # what is written to an output: value, modifier, stamp
-
 AMID_NOTHING: Final = ("", "edit", "over")  # values of Worker.busy: automatic events leave at once (A9)
 
 SAME_MOMENT_S: Final = 1e-9  # times that differ by less are one: sums of floats do
 
 
-class Worker(Vertex):
+class Worker(Vertex["Worker"]):
     """What a node is while its graph runs.
 
     Attributes:
@@ -170,7 +167,9 @@ class Worker(Vertex):
 
     # --- made -------------------------------------------------------------------------------------------------------
 
-    def __init__(self, core: Core, path: str, node: Node | None, options: NodeOptions | None, group: Group) -> None:
+    def __init__(
+        self, core: Core[Worker], path: str, node: Node | None, options: NodeOptions | None, group: Group[Worker]
+    ) -> None:
         super().__init__(core, path, node, options, group)
         self.inputs = Barrier()
         self.outputs = Barrier()
@@ -181,7 +180,7 @@ class Worker(Vertex):
         self._is_looked_at_by_nobody()
         self._has_not_fired()
         self._has_no_timers()
-        self.flights: Flights | None = None  # of a node that allows several firings under way (F14)
+        self.flights: Flights[Worker] | None = None  # of a node that allows several firings under way (F14)
         self.tasks: Any = None
         self.attempts: Attempts | None = None  # at its firing, where one that fails is tried again (X1)
         if options is not None and options.concurrency > 1:
@@ -207,7 +206,7 @@ class Worker(Vertex):
         self.observed = False  # somebody waits at its barriers: no fast paths
         self.meter: Any = None  # a Meter, while somebody wants statistics
         self.listened: list[Any] | None = None  # what tells those who send to slots of its own that it may listen
-        self.region: Region | None = None  # in which its firings are fused
+        self.region: Region[Worker] | None = None  # in which its firings are fused
         self.speaks = False  # its code sends by itself: the region says so before each call
         self.unfit = False  # its firings turned out not to be plain calls
 
@@ -248,7 +247,7 @@ class Worker(Vertex):
 
     # --- its place in the plan (R4) ---------------------------------------------------------------------------------
 
-    def stand_for(self, scope: Scope, active_for_s: float | None) -> None:
+    def stand_for(self, scope: Scope[Worker], active_for_s: float | None) -> None:
         """Have the automatic ports of a subgraph that is dissolved; never fire."""
         self.scope = scope
         self.silent_code = True
@@ -284,7 +283,7 @@ class Worker(Vertex):
         event = self.make_event(name, port if self.node is not None or name == "start" else None)
         event.feed((*event.edges, edge))
 
-    def make_event(self, name: str, port: EventPort[Any] | None) -> RunningEvent:
+    def make_event(self, name: str, port: EventPort[Any] | None) -> RunningEvent[Worker]:
         """Give the running event of this name; one that has neither edge nor subscriber yet is made now."""
         event = self.events.get(name)
         if event is None:
@@ -292,7 +291,7 @@ class Worker(Vertex):
             self.ask_for(event)
         return event
 
-    def regroup(self, group: Group) -> None:
+    def regroup(self, group: Group[Worker]) -> None:
         """It runs elsewhere from now on; where it stood in a queue it does no more."""
         self.leave_queue()
         self.join(group)
@@ -678,7 +677,7 @@ class Worker(Vertex):
         """This is what it does from now on when it has its turn."""
         self.step = step
 
-    def be_fused(self, region: Region | None) -> None:
+    def be_fused(self, region: Region[Worker] | None) -> None:
         """A region fuses its firings with those of others; None: none does any more."""
         self.region = region
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import msgspec
 
-from hfg.engine.model.core import Core
+from hfg.engine.model import Core
 from hfg.engine.model.worker import ENDED
 from hfg.engine.observing.tables import seconds, table
 from hfg.graph import Graph

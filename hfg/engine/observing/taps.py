@@ -14,8 +14,9 @@ from typing import Any, Protocol, TypeAlias
 
 from hfg.base.token import Token
 from hfg.engine.fusion.specialise import specialise
+from hfg.engine.model.events import RunningEvent
 from hfg.engine.model.looks import FirstLiveLook, Look
-from hfg.engine.model.worker import RunningEvent, Worker
+from hfg.engine.model.worker import Worker
 from hfg.engine.rules.listening import find_listeners
 from hfg.engine.runtime import ports, relays
 from hfg.engine.runtime.callbacks import Edited
@@ -276,7 +277,7 @@ class Taps:
                 if place in event.edges:
                     self._tell_event(event)
 
-    def _tell_event(self, event: RunningEvent) -> None:
+    def _tell_event(self, event: RunningEvent[Worker]) -> None:
         looks = tuple(self._looks.get(event, ()))
         event.tap = looks if looks or any(edge.tap is not None for edge in event.edges) else None
         if event.tap is not None and event.port is not None and event.port._observers is None:
@@ -338,7 +339,7 @@ class Taps:
             )
         return what
 
-    def _running(self, event: Any) -> RunningEvent | None:
+    def _running(self, event: Any) -> RunningEvent[Worker] | None:
         worker = self._worker(event)
         return worker.events.get(event.name) if worker.node is None else ports.bind_event(worker, event.name)
 

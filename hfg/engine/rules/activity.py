@@ -13,8 +13,7 @@ from typing import Any, Literal
 import msgspec
 
 from hfg.base.token import Token
-from hfg.engine.model.core import Core
-from hfg.engine.model.scopes import Gate, Scope
+from hfg.engine.model import Core, Gate, Scope
 from hfg.engine.model.worker import AMID_NOTHING, RESTING, Worker
 from hfg.engine.rules import doing
 from hfg.engine.rules.agenda import consider, must_wait

@@ -5,7 +5,7 @@ Plain functions over the run's state; they queue workers and never run a node's 
 
 from __future__ import annotations
 
-from hfg.engine.model.core import Core
+from hfg.engine.model import Core
 from hfg.engine.model.worker import DISABLED, FULL, NO_CALLS, SAME_MOMENT_S, UNREADY, Worker
 from hfg.ports.edges import Edge, EventEdge
 

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, TypeAlias
 
-from hfg.engine.model.tasks import current_task
-from hfg.engine.model.worker import RunningEvent, Worker
+from hfg.engine.model import RunningEvent, Worker
+from hfg.engine.model.current import current_task
 from hfg.engine.rules.sending import trigger_beside
 from hfg.errors import UsageError
 

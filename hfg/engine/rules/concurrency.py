@@ -13,7 +13,8 @@ from types import CoroutineType
 from typing import Any
 
 from hfg.base.token import Marker, Token
-from hfg.engine.model.flights import Flight, Flights, current_flight
+from hfg.engine.model import Flight, Flights
+from hfg.engine.model.current import current_flight
 from hfg.engine.model.worker import DISABLED, REMOVED, Worker
 from hfg.engine.rules import errors, firing
 from hfg.engine.rules.agenda import consider, idle_again

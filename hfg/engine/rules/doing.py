@@ -9,7 +9,8 @@ from __future__ import annotations
 import asyncio
 from functools import partial
 
-from hfg.engine.model.tasks import Doing, Task, Tasks, current_task
+from hfg.engine.model import Doing, Task, Tasks
+from hfg.engine.model.current import current_task
 from hfg.engine.model.worker import BACKOFF, DISABLED, TORN_DOWN, Worker
 from hfg.engine.rules.modifiers import derive_scopes
 from hfg.engine.rules.sending import trigger_beside

@@ -10,9 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hfg.base.token import NO_MESSAGE, Marker
-from hfg.engine.model.core import Core
-from hfg.engine.model.iteration import Iteration
-from hfg.engine.model.worker import Worker
+from hfg.engine.model import Core, Iteration, Worker
 from hfg.engine.rules import firing, quiet, rings
 from hfg.engine.rules.releasing import take_from_reader
 from hfg.engine.rules.sending import put_outputs

@@ -10,8 +10,7 @@ from typing import Any
 
 from hfg.activity.rules import after_receipt
 from hfg.base.token import Token
-from hfg.engine.model.core import Core
-from hfg.engine.model.scopes import Scope
+from hfg.engine.model import Core, Scope
 from hfg.engine.model.worker import REMOVED, Worker
 from hfg.engine.rules.agenda import freed
 from hfg.engine.rules.listening import may_listen

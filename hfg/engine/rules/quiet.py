@@ -10,7 +10,7 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 from hfg.base.token import END
-from hfg.engine.model.core import Core
+from hfg.engine.model import Core
 from hfg.engine.model.worker import (
     BACKOFF,
     DISABLED,

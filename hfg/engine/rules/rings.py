@@ -18,7 +18,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from typing import Any, Final, TypeAlias
 
-from hfg.engine.model.core import Core
+from hfg.engine.model import Core
 from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, CROWDED, ENDED, FIRES_NO_MORE, FULL, Worker
 from hfg.engine.rules.agenda import freed, must_wait
 from hfg.errors import QueueLimit, RunError

@@ -11,8 +11,8 @@ from typing import Any, TypeAlias
 
 from hfg.activity.rules import asked_for, leaving
 from hfg.base.token import END, NO_MESSAGE, Marker, Token
-from hfg.engine.model.core import Core
-from hfg.engine.model.worker import AMID_NOTHING, DISABLED, ENDED, RunningEvent, Worker
+from hfg.engine.model import Core, RunningEvent
+from hfg.engine.model.worker import AMID_NOTHING, DISABLED, ENDED, Worker
 from hfg.engine.rules.agenda import add_call, arrived, let_follow, note_full
 from hfg.engine.rules.listening import listens, may_listen
 from hfg.engine.rules.modifiers import (

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from hfg.engine.model.core import Core
+from hfg.engine.model import Core
 from hfg.engine.model.worker import DISABLED, ENDED, FUTILE, Worker
 from hfg.engine.rules.agenda import unblock
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 
-from hfg.engine.model.scopes import Scope
-from hfg.engine.model.worker import Worker
+from hfg.engine.model import Scope, Worker
 from hfg.engine.rules import lifecycle, wiring
 from hfg.engine.rules.activity import deactivate_inside, scopes_changed
 from hfg.engine.rules.agenda import consider

@@ -6,7 +6,7 @@ Called when the plan is made and when something is enabled, disabled, ended or e
 
 from __future__ import annotations
 
-from hfg.engine.model.scopes import Scope
+from hfg.engine.model import Scope
 from hfg.engine.model.worker import DISABLED, UNWIRED, Worker
 from hfg.engine.rules.agenda import consider, note_full
 from hfg.engine.rules.listening import find_listeners

@@ -21,12 +21,10 @@ from hfg.engine.executing.groups import CheckedTurn, Dispatching, LoopGroup, Sid
 from hfg.engine.executing.speaking import log_of_speaker
 from hfg.engine.executing.tasks import TaskRunner
 from hfg.engine.executing.virtual import VirtualTimeLoop
-from hfg.engine.model.core import Core
-from hfg.engine.model.groups import Group
+from hfg.engine.model import Core, Doing, Group, Worker
+from hfg.engine.model.invariants import check_invariants
 from hfg.engine.model.policies import make_policy
 from hfg.engine.model.sharing import Sharing
-from hfg.engine.model.tasks import Doing
-from hfg.engine.model.worker import Worker
 from hfg.engine.rules import iterating, quiet, rings
 from hfg.engine.runtime import plan, rx
 from hfg.engine.runtime.callbacks import Callbacks
@@ -267,7 +265,7 @@ class Engine:
           EngineInternalError: one of them does not hold.
         """
         if len(self.core.workers) <= _MOST_CHECKED:
-            self.core.check_invariants()
+            check_invariants(self.core)
 
     def on_loop(self) -> bool:
         """Whether the caller is on the run's own thread."""

@@ -19,8 +19,7 @@ from hfg.engine.executing.groups import ThreadGroup
 from hfg.engine.executing.lost import LostTasks
 from hfg.engine.executing.speaking import speaker
 from hfg.engine.executing.watchdog import Watch, watchdog
-from hfg.engine.model.core import Core
-from hfg.engine.model.flights import Flight
+from hfg.engine.model import Core, Flight
 from hfg.engine.model.worker import STARTING, Worker
 from hfg.engine.rules import lifecycle, wiring
 from hfg.engine.rules.activity import gate_changed

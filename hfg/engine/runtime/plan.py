@@ -8,10 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hfg.engine.model.core import Core
-from hfg.engine.model.groups import Group
-from hfg.engine.model.iteration import Iteration
-from hfg.engine.model.scopes import Gate, Scope
+from hfg.engine.model import Core, Gate, Group, Iteration, Scope
 from hfg.engine.model.worker import DISABLED, STARTING, UNWIRED, Worker
 from hfg.engine.rules.wiring import is_live, rewire
 from hfg.errors import GraphError, UsageError

@@ -11,8 +11,7 @@ from typing import Any
 
 from hfg.base.token import Token
 from hfg.engine.fusion import slots
-from hfg.engine.model.vertex import RunningEvent
-from hfg.engine.model.worker import Worker
+from hfg.engine.model import RunningEvent, Worker
 from hfg.engine.rules import beside, concurrency, firing
 from hfg.engine.rules.sending import trigger
 from hfg.engine.rules.sharing import need_unwritten

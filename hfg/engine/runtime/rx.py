@@ -22,8 +22,7 @@ from reactivex.subject import Subject
 from typing_extensions import override
 
 from hfg.base.token import Token
-from hfg.engine.model.core import Host
-from hfg.engine.model.iteration import Iteration
+from hfg.engine.model import Host, Iteration
 from hfg.engine.rules.errors import operator_failed
 from hfg.engine.rules.modifiers import drop
 from hfg.engine.rules.sending import enqueue

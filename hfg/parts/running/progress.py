@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from hfg.base.token import END
-from hfg.engine.model.core import Core
+from hfg.engine.model import Core
 from hfg.engine.model.worker import ENDED, Worker
 from hfg.engine.runtime.borders import Inlet, Outlet
 from hfg.parts.model.inheriting import Alignment, Arrived, Inheritance, Where

@@ -1,0 +1,75 @@
+"""What the model asks of a node below the class of nodes, which is `worker.Worker`; and what a timer is.
+
+A run is a web: a node knows its group, its subgraphs and the run, and each of these knows its nodes. Imports go one way
+all the same, since what stands below the class of nodes is generic in it: `NodeT`. `hfg.engine.model` gives the names
+with it filled in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
+
+__all__ = ["Node", "NodeT", "Timer"]
+
+
+class Timer(Protocol):
+    """A call that has not happened yet."""
+
+    def cancel(self) -> None:
+        """Forget it."""
+
+
+class _Counts(Protocol):
+    """What of the run is counted by what a node has under way."""
+
+    tasks: int
+    waiting_room: int
+
+    @property
+    def suspects(self) -> dict[Any, None]: ...
+
+    def set_out(self) -> None: ...
+
+    def come_back(self) -> None: ...
+
+
+class Node(Protocol):
+    """What firings, tasks, subgraphs, gates and borders ask of a node."""
+
+    path: str
+    type: Any
+    options: Any
+    active: bool
+    deferred: list[int] | None
+    in_edges: tuple[Any, ...]
+    slot_edges: tuple[Any, ...]
+    out_edges: tuple[tuple[Any, ...], ...]
+    around: tuple[Any, ...]
+    within: Any
+    gates: list[Any]
+
+    @property
+    def core(self) -> _Counts:
+        """The run."""
+
+    def lie_in(self, around: tuple[Any, ...]) -> None:
+        """These subgraphs are around it, outermost first."""
+
+    @property
+    def be_gated(self) -> Callable[[Any], None]:
+        """It works only while the state of this gate is active."""
+
+    @property
+    def lie_within(self) -> Callable[[Any], None]:
+        """G4: the innermost subgraph around it that iterates is this one's."""
+
+    def moves_by_itself(self) -> bool:
+        """Whether something of it is under way or will be, without anybody else."""
+
+    def tell_watchers(self) -> None:
+        """F8: code of it is over."""
+
+
+NodeT = TypeVar("NodeT", bound=Node)
+"""The class of nodes, to what stands below it."""

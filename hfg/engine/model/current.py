@@ -1,0 +1,20 @@
+"""Whose code runs, where `asyncio` cannot tell: in which of several firings, or in which task of a node.
+
+Context variables, so that they hold in whatever that code starts by itself. Stands on `worker`.
+"""
+
+from __future__ import annotations
+
+from contextvars import ContextVar
+
+from hfg.engine.model.flights import Flight
+from hfg.engine.model.tasks import Task
+from hfg.engine.model.worker import Worker
+
+__all__ = ["current_flight", "current_task"]
+
+current_flight: ContextVar[Flight[Worker] | None] = ContextVar("hfg.flight", default=None)
+"""Whose code runs: set around the code of each firing that goes on beside others."""
+
+current_task: ContextVar[Task[Worker] | None] = ContextVar("hfg.task", default=None)
+"""Whose code runs, if it is that of a task; also in the tasks that it starts by itself."""
