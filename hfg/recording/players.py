@@ -186,7 +186,7 @@ class Player:
         """Count a call of a slot of the node."""
         self._look()
         step = self._other
-        if step is not None and step.call and self._worker is not None and step.call == self._worker.call_number:
+        if step is not None and step.call and self._worker is not None and step.call == self._worker.counts.calls:
             self._play_other(step)
         self._play_others()
 

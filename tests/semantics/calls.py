@@ -16,7 +16,7 @@ import pytest
 
 import hfg
 from hfg.base.token import Token
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.counts import Counts
 from hfg.testing.conformance import value_key
 from hfg.testing.plans import GraphPlan
 from hfg.testing.recording import Recorder
@@ -135,18 +135,18 @@ def note_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
 
 def _count_fused(monkeypatch: pytest.MonkeyPatch, calls: Calls) -> None:
     """Count what regions do from now on."""
-    has_fired, was_called = Worker.has_fired, Worker.was_called
+    add_firings, add_calls = Counts.add_firings, Counts.add_calls
 
-    def fired(self: Worker, times: int, silently: int = 0) -> None:
+    def fired(self: Counts, times: int, silently: int = 0) -> None:
         calls.fused += times
-        has_fired(self, times, silently)
+        add_firings(self, times, silently)
 
-    def called(self: Worker, times: int) -> None:
+    def called(self: Counts, times: int) -> None:
         calls.fused += times
-        was_called(self, times)
+        add_calls(self, times)
 
-    monkeypatch.setattr(Worker, "has_fired", fired)
-    monkeypatch.setattr(Worker, "was_called", called)
+    monkeypatch.setattr(Counts, "add_firings", fired)
+    monkeypatch.setattr(Counts, "add_calls", called)
 
 
 class Ran(NamedTuple):

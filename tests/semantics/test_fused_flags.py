@@ -26,7 +26,7 @@ def left(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
 
     def noted(region: Region, k: int, locals_: dict[str, Any]) -> Any:
         worker = materialise(region, k, locals_)
-        found.append((worker.path, worker.firings))
+        found.append((worker.path, worker.counts.firings))
         return worker
 
     monkeypatch.setattr(Region, "materialise", noted)

@@ -286,8 +286,8 @@ class Edits:
                 if cancelled is not None or self._engine.core.over:
                     raise
                 cancelled = error
-                if worker.carrier is not None:
-                    worker.carrier.cancel()
+                if worker.execution.carrier is not None:
+                    worker.execution.carrier.cancel()
         if cancelled is not None:
             raise cancelled
         failure = waiter.result()
@@ -313,7 +313,7 @@ class Edits:
             await self._to_its_end(self._become_again(begun))
             raise
         for worker, _ in begun:
-            worker.not_ended()
+            worker.start_over()
             worker.allow(ENDED | UNREADY)
 
     async def _become_again(self, begun: list[tuple[Worker, Any]]) -> None:
@@ -334,14 +334,14 @@ class Edits:
         except NodeError as error:
             self._engine.core.errors.append(error)
         engine_ports.release_ports(worker)
-        if worker.carrier is not None:
-            worker.carrier.drop()
-            worker.be_carried(None)
+        if worker.execution.carrier is not None:
+            worker.execution.carrier.drop()
+            worker.execution.run_in(None)
         if worker.flights is not None:
             concurrency.abandon(worker)
             worker.flights.drop_carriers()
         worker.take_node(node)
-        node._active = worker.active
+        worker.show_activity()
         self._lifetime.carry(worker)
         await self._hook(worker, lifecycle.set_up)
 
@@ -444,8 +444,8 @@ class Edits:
                 engine.core.errors.append(error)
             engine_ports.release_ports(worker)
             self._lifetime.forget(worker)
-            if worker.carrier is not None:
-                worker.carrier.drop()
+            if worker.execution.carrier is not None:
+                worker.execution.carrier.drop()
             if worker.flights is not None:
                 concurrency.abandon(worker)
                 worker.flights.drop_carriers()

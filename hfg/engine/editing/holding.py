@@ -100,7 +100,7 @@ class Held:
             answer(self._waiter, None)
 
     def _is_room_awaited(self) -> bool:
-        return any(worker.waiting_room for worker in self._workers)
+        return any(worker.room.waiting for worker in self._workers)
 
     def look_for_room(self) -> None:
         """Somebody's code begins or ceases to wait until a queue has room (F8)."""

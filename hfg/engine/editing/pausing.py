@@ -410,7 +410,7 @@ def _path(place: Any, labels: Sequence[str]) -> str:
 def _any_works(workers: list[Worker]) -> bool:
     """Whether a step of one of them will be over by itself; who waits for room in a queue (F8) may not be."""
     return any(
-        (worker.busy or worker.is_flying()) and not worker.waiting_room and worker.iteration is None
+        (worker.busy or worker.is_flying()) and not worker.room.waiting and worker.iteration is None
         for worker in workers
     )
 

@@ -124,7 +124,7 @@ def _has_its_values(worker: Worker) -> bool:
     """Whether its code was given the parameters once and for all, and goes on with them."""
     if not worker.type.given_parameters_once or worker.blocked & (DISABLED | BACKOFF):
         return False  # these begin afresh
-    return worker.generator is not None or worker.busy == "firing"
+    return worker.execution.generator is not None or worker.busy == "firing"
 
 
 def _replacing(node: Any, name: str) -> str:

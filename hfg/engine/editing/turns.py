@@ -98,7 +98,7 @@ def _speaker() -> Worker | None:
     """Whose code asks; a task that it has started is nobody's, for nothing waits for that."""
     worker = whose_code()
     flight = current_flight.get()
-    carrier = None if worker is None else worker.carrier if flight is None else flight.carrier
+    carrier = None if worker is None else worker.execution.carrier if flight is None else flight.carrier
     return worker if carrier is not None and carrier.task is asyncio.current_task() else None
 
 

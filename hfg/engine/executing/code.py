@@ -121,10 +121,10 @@ class CodeRunner:
 
     def drive(self, worker: Worker, coroutine: Any, done: Done) -> None:
         """See `core.Code`."""
-        carrier = worker.carrier
+        carrier = worker.execution.carrier
         if carrier is None:
             carrier = self.carrier(worker)
-            worker.be_carried(carrier)
+            worker.execution.run_in(carrier)
         result, error = self._call(worker, carrier.start, (coroutine, self.late(worker, done)))
         if result is not PENDING:
             done(result, error)
@@ -142,7 +142,7 @@ class CodeRunner:
         """X2: the firing may not take longer than its limit."""
         options = worker.options
         if options is not None and options.max_duration_s is not None and worker.busy == "firing":
-            worker.limit(self.core.after(options.max_duration_s, lambda: errors.time_out(worker)))
+            worker.execution.limit(self.core.after(options.max_duration_s, lambda: errors.time_out(worker)))
 
     # --- several firings of a node at once (F14) --------------------------------------------------------------------
 
@@ -231,14 +231,14 @@ class CodeRunner:
         closing = self.core.over  # a hook of the teardown; what began before the end is not listened to after it
 
         def over(result: Any, error: BaseException | None) -> None:
-            if worker.in_flight and (worker.carrier is carrier or carrier is None):
+            if worker.execution.in_flight and (worker.execution.carrier is carrier or carrier is None):
                 worker.come_back()
             else:
                 self._drop(carrier)
             self._tell(done, result, error, closing=closing)
             self._engine.go_on()
 
-        carrier = worker.carrier
+        carrier = worker.execution.carrier
         return over
 
     def _tell(self, done: Done, result: Any, error: BaseException | None, *, closing: bool = False) -> None:
@@ -276,7 +276,7 @@ class CodeRunner:
         """See `core.Code`."""
         job = self._in_thread(workers[0], call, arguments, done, always=True)
         for worker in workers:
-            worker.take_job(job)
+            worker.execution.take_job(job)
 
     def _in_thread(
         self,
@@ -302,7 +302,7 @@ class CodeRunner:
                 done(job.result, job.error)
 
         worker_job = Job(worker, back, call, arguments, done)
-        worker.take_job(worker_job)
+        worker.execution.take_job(worker_job)
         if isinstance(self.loop, VirtualTimeLoop):
             limit = worker.options.max_duration_s if worker.busy == "firing" else None
             self._hold(worker_job, limit, partial(errors.time_out, worker))
@@ -326,7 +326,7 @@ class CodeRunner:
         loop = self.loop
         if isinstance(loop, VirtualTimeLoop):
             for worker in self.core.workers:
-                for job in (worker.job, *[flight.job for flight in worker.flights or ()]):
+                for job in (worker.execution.job, *[flight.job for flight in worker.flights or ()]):
                     if job is not None and job.held is not None:
                         job.held.limit(seconds, partial(self._hold_no_more, job))
 
@@ -379,15 +379,15 @@ class CodeRunner:
 
     def interrupt(self, worker: Worker, *, amid: Worker | None = None) -> None:
         """See `core.Code`; `amid`: whose call it is, if that is another node's of its region."""
-        if not worker.in_flight:
+        if not worker.execution.in_flight:
             return
-        job, carrier = worker.job, worker.carrier
+        job, carrier = worker.execution.job, worker.execution.carrier
         worker.come_back()
         if worker.group.threaded:
             amid = amid or worker
-            self._abandon(job, amid, amid.firings)
+            self._abandon(job, amid, amid.counts.firings)
         else:
-            worker.be_carried(None)
+            worker.execution.run_in(None)
             self._give_up(carrier)
 
     async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
@@ -395,13 +395,13 @@ class CodeRunner:
         worker = event.worker
         core = worker.core
         task = current_task.get()
-        own: Any = worker.code_waits_for_room if whose_code() is worker else _nobody_waits  # its own waits for us
+        own: Any = worker.room.wait if whose_code() is worker else _nobody_waits  # its own waits for us
         if task is not None and task.worker is worker:
             trigger_beside(event, value, activity, stamp)
             own = worker.tasks.wait_for_room
         else:
             trigger(event, value, activity, stamp)
-        while worker.full_edges and core.started and not core.over:
+        while worker.room.full_edges and core.started and not core.over:
             await self._room(worker, own)
 
     async def _room(self, worker: Worker, own: Callable[[int], None]) -> None:
@@ -417,7 +417,7 @@ class CodeRunner:
                 own(-1)
             answer(waiter, None)
 
-        worker.when_room(over)
+        worker.room.when_free(over)
         own(1)
         self._look_for_room()
         worker.core.host.kick()

@@ -81,7 +81,7 @@ class TaskRunner:
             raise refusal
         if doing is None:
             _not_again(worker)
-        if worker.blocked & DISABLED and not worker.opening:
+        if worker.blocked & DISABLED and not worker.lifecycle.opening:
             coroutine.close()  # a firing of a node that was switched off meanwhile: what it does goes nowhere (F10)
             return
         if worker.tasks is None:
@@ -107,7 +107,7 @@ class TaskRunner:
             )
         if self._core.over:
             return NotRunning(f"{call}, for the run is over; await it in teardown() itself")
-        if not worker.is_up:
+        if not worker.lifecycle.is_up:
             return NotRunning(f"{call} while it is torn down; await it in teardown(), or start it in setup()")
         return None
 

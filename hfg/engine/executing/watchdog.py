@@ -44,7 +44,7 @@ class Watch:
             self.seen = None
             return self.core.pumping
         region = worker.region
-        seen = (worker.index, worker.firings + (region.waves if region is not None else 0), worker.call_number)
+        seen = (worker.index, worker.counts.firings + (region.waves if region is not None else 0), worker.counts.calls)
         if seen != self.seen:
             self.seen, self.since = seen, now
         elif now - self.since >= self.limit_s > 0 and worker.index not in self.warned:

@@ -246,7 +246,7 @@ async def signal(
             adopt(edge)
     while len(edge.queue) >= edge.capacity:
         waiter: asyncio.Future[None] = engine.loop.create_future()
-        edge.source.when_room(partial(answer, waiter, None))
+        edge.source.room.when_free(partial(answer, waiter, None))
         await until(engine, lambda done: waiter.add_done_callback(lambda _: done()))  # noqa: B023
         _check_running(engine)
     explicit = activity or 0

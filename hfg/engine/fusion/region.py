@@ -98,7 +98,7 @@ class Region:
         self.silent = [0] * len(order)  # silent firings, likewise
         self.spread = [0] * len(order)  # how often all behind a member were silent since it was
         self._exits = [0] * len(order)
-        self._formed_at = head.firings
+        self._formed_at = head.counts.firings
         self._respecialise = respecialise
         self._take_members()
         self._plain = self._write(measured=False)
@@ -232,9 +232,9 @@ class Region:
             spread += self.spread[number]
             self.silent[number] = self.spread[number] = 0
             if number in called:  # by a marker a slot is not called (T4)
-                worker.was_called(waves - silent)
+                worker.counts.add_calls(waves - silent)
             else:
-                worker.has_fired(waves, silent)
+                worker.counts.add_firings(waves, silent)
 
     # --- the end of a wave --------------------------------------------------------------------------------------------
 
@@ -360,7 +360,7 @@ class Region:
     def _note_exit(self, k: int) -> None:
         """A member that is hardly ever plain is none: the region forms anew without it."""
         self._exits[k] += 1
-        waves = self.head.firings + self.waves - self._formed_at
+        waves = self.head.counts.firings + self.waves - self._formed_at
         if self._exits[k] >= _MOST_EXITS and self._exits[k] * 8 > waves:
             self.order[k].fit_no_more()
             self.doomed = True
@@ -408,9 +408,9 @@ class Region:
     def _count(self, worker: Worker, called: bool) -> None:
         """It has fired, or was called, in the wave that does not come to its end; its silence is counted already."""
         if called:
-            worker.was_called(1)
+            worker.counts.add_calls(1)
         else:
-            worker.has_fired(1)
+            worker.counts.add_firings(1)
 
     def _queue_behind(self, k: int) -> None:
         """Who stands behind member k is enabled by now, or by an outside edge that was waited for (R2)."""
@@ -446,7 +446,7 @@ class Region:
 
         A call that really waits becomes a firing like any other; the wave's coroutine stays around it.
         """
-        carrier: Any = self._lender.carrier  # type: ignore[union-attr]  # there is async code
+        carrier: Any = self._lender.execution.carrier  # type: ignore[union-attr]  # there is async code
         self._coroutine = waves
         if carrier.start(waves, self._late, self._detach) is PENDING and not self.detached:
             if self._may_give_way:
@@ -487,9 +487,7 @@ class Region:
         if gave_way:
             lender.come_back()
             self._rest()
-        own, lent = worker.carrier, lender.carrier
-        lender.be_carried(own)
-        worker.be_carried(lent)  # whoever cancels the node means this code
+        worker.execution.exchange(lender.execution)  # whoever cancels the node means this code
         self.detached = True
         self._note_exit(k)
         self.materialise(k, found)

@@ -87,7 +87,7 @@ def _signal_step(group: Group, core: Core) -> Step:
                     if edge is None:
                         edge = calls.popleft()
                     handler = edge.handler  # what is called as a field is looked up the slow way
-                    worker.call_number += 1
+                    worker.counts.calls += 1
                     value, modifier, worker.stamp, _ = edge.queue.popleft()
                     if edge.full:
                         freed(edge)
@@ -134,7 +134,7 @@ def _token_step(worker: Worker, edge: SyncEdge) -> Step:
             return general(worker)
         # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
         calls.popleft()
-        worker.call_number += 1
+        worker.counts.calls += 1
         token, lies.token = lies.token, None
         if pipelined:
             release(pipelined)
@@ -263,14 +263,16 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
 def _take_activity(worker: Worker, active: bool) -> None:
     """A6: what the call brings acts before it; nothing depends on the activity of such a node but itself."""
     if worker.active != active:
-        worker.active = worker.node._active = active
-        tell_activity(worker, "token")
+        worker.take_activity(active)
+        if worker.core.seldom is not None:
+            tell_activity(worker, "token")
 
 
 def _give_activity(worker: Worker, target: Worker) -> None:
     """A5: what carries activity takes it from the sender; it stays its right until the call is over (A3)."""
     if worker.active:
         worker.give_away_activity()
-        tell_activity(worker, "sent")
+        if worker.core.seldom is not None:
+            tell_activity(worker, "sent")
     bring_activity(target)
     derive_scopes(worker.core)

@@ -127,11 +127,11 @@ class ThreadRegion(Region):
         for worker in self.order:
             worker.be_in_wave("firing")  # each may be the one whose call is under way: only the thread could tell
         for worker in self._speaking:
-            worker.stamp_with(stamp)
+            worker.send_as(stamp)
         for edge in self.entries:
             make_room(edge)
         if head.paced:
-            head.note_start(head.options.max_rate_hz)
+            head.rate.start(self.core.now(), head.options.max_rate_hz)
         self._wave = (self._measured if self._measuring else None) or self._plain
         self.flags.clear()
         self.running = True
@@ -146,7 +146,7 @@ class ThreadRegion(Region):
         return plain and (self.armed or self.arm())
 
     def _source_is_open(self) -> bool:
-        return self.head.type.process_kind != "generator" or self.head.generator is not None
+        return self.head.type.process_kind != "generator" or self.head.execution.generator is not None
 
     def _all_plain(self) -> bool:
         """Each entry holds a token, and none of them moves activity."""
@@ -314,7 +314,7 @@ class _ThreadWriter(Writer):
         self._register()
         self.say("done = 0")
         if self.is_generator:
-            self.say("generator = worker.generator")
+            self.say("generator = worker.execution.generator")
         if self.loops:
             self.say(f"until = monotonic() + epoch + {_SLICE_S}")
 

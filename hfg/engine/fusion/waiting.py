@@ -63,7 +63,7 @@ def waiting_step(worker: Worker) -> Step:
         worker.fire_plainly(held, stamp)
         if pipelined:
             release(pipelined)
-        carrier = worker.carrier
+        carrier = worker.execution.carrier
         if carrier is not lent:
             lent, late = carrier, code.late(worker, leave)
         core.speaker = worker

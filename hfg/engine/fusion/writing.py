@@ -320,7 +320,10 @@ class Writer:
             self._nonlocal()
         odd = ["worker.special", "worker.busy", "not worker.placed"]
         odd += ["worker.active"] if self.carries else []
-        odd += ["worker.generator is None"] if self.is_generator else [] if self.is_source else ["inputs.missing"]
+        if self.is_generator:
+            odd.append("worker.execution.generator is None")
+        elif not self.is_source:
+            odd.append("inputs.missing")
         for number, edge in enumerate(self.entries):
             if type(edge) is SyncEdge:
                 odd.append(f"entry{number}.token.activity")
@@ -332,7 +335,7 @@ class Writer:
         self._register()
         say("core.speaker = worker")
         if self.head.paced:
-            say("worker.note_start(worker.options.max_rate_hz)")
+            say("worker.rate.start(now(), worker.options.max_rate_hz)")
         if self.is_async:
             say("return start(waves(worker))")
             self.indent = 1
@@ -341,7 +344,8 @@ class Writer:
             self._nonlocal()
         say("done = 0")
         if self.is_generator:
-            say("generator = getattr(worker.generator, 'measured', worker.generator)  # a wave measures by itself")
+            say("generator = worker.execution.generator")
+            say("generator = getattr(generator, 'measured', generator)  # a wave measures by itself")
         if self.is_source and self.loops:
             say("until = core.until")
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
+from hfg.engine.model.ending import Ending
+
 __all__ = ["Node", "NodeT", "Timer"]
 
 
@@ -19,12 +21,16 @@ class Timer(Protocol):
     def cancel(self) -> None:
         """Forget it."""
 
+    def recount(self, counts: bool) -> None:
+        """Whether it could start something, so that quiet waits for it."""
+
 
 class _Counts(Protocol):
     """What of the run is counted by what a node has under way."""
 
     tasks: int
     waiting_room: int
+    full_edges: int
 
     @property
     def suspects(self) -> dict[Any, None]: ...
@@ -34,6 +40,10 @@ class _Counts(Protocol):
     def come_back(self) -> None: ...
 
 
+class _Watched(Protocol):
+    def tell_watchers(self) -> None: ...
+
+
 class Node(Protocol):
     """What firings, tasks, subgraphs, gates and borders ask of a node."""
 
@@ -41,7 +51,7 @@ class Node(Protocol):
     type: Any
     options: Any
     active: bool
-    deferred: list[int] | None
+    ending: Ending | None
     in_edges: tuple[Any, ...]
     slot_edges: tuple[Any, ...]
     out_edges: tuple[tuple[Any, ...], ...]
@@ -67,8 +77,9 @@ class Node(Protocol):
     def moves_by_itself(self) -> bool:
         """Whether something of it is under way or will be, without anybody else."""
 
-    def tell_watchers(self) -> None:
-        """F8: code of it is over."""
+    @property
+    def room(self) -> _Watched:
+        """F8: who waits until code of it is over."""
 
 
 NodeT = TypeVar("NodeT", bound=Node)

@@ -143,7 +143,7 @@ class Flight(Generic[NodeT]):
         if self.working:
             self.working = False
             self.worker.core.come_back()
-            self.worker.tell_watchers()
+            self.worker.room.tell_watchers()
         return had
 
     def limit(self, timer: Timer) -> None:

@@ -47,7 +47,7 @@ def _check_workers(core: Core[Worker]) -> None:
     for worker in core.workers:
         worker.check_invariants()
         worker.outputs.check_invariants(held[worker], f'outputs of "{worker.path}"')
-        if worker.full_edges != full[worker]:
+        if worker.room.full_edges != full[worker]:
             raise EngineInternalError(f'node "{worker.path}": {full[worker]} of its queues are full (F8)')
         if worker.region is not None and worker.region not in core.regions:
             raise EngineInternalError(f'node "{worker.path}": its region is gone')

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Generic
 
-from hfg.engine.model.contracts import NodeT
+from hfg.engine.model.contracts import Node, NodeT
 
 __all__ = ["Gate", "Scope"]
 
@@ -131,9 +131,13 @@ class Scope(Generic[NodeT]):
 
         (G2, F12).
         """
-        return any(worker.active or (worker.deferred and 1 in worker.deferred) for worker in self.members) or any(
+        return any(worker.active or _will_be(worker) for worker in self.members) or any(
             token.activity > 0 for edge in self.inner_edges for token in edge.contents()
         )
+
+
+def _will_be(worker: Node) -> bool:
+    return worker.ending is not None and worker.ending.brings_activity
 
 
 class Gate(Generic[NodeT]):

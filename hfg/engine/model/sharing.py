@@ -282,7 +282,7 @@ class Sharing:
             if leases and leases[0].number == token.sequence:
                 lease = leases.popleft()
                 lease.ticket = worker.ticket
-                lease.firing = worker.firings if worker.busy == "firing" else 0
+                lease.firing = worker.counts.firings if worker.busy == "firing" else 0
                 lease.senders_ticket = edge.source.ticket
                 self._at_work.setdefault(worker, []).append(lease)
                 if self._is_changed(lease):

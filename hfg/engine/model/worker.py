@@ -14,9 +14,15 @@ from typing import Any, Final
 from hfg.engine.model.calls import Calls, CallsOfOne
 from hfg.engine.model.contracts import Timer
 from hfg.engine.model.core import Core, Region
+from hfg.engine.model.counts import Counts
+from hfg.engine.model.ending import Ending
 from hfg.engine.model.events import RunningEvent
+from hfg.engine.model.execution import Execution
 from hfg.engine.model.flights import Attempts, Entry, Flights
 from hfg.engine.model.groups import Group
+from hfg.engine.model.lifecycle import Lifecycle
+from hfg.engine.model.rate import Rate
+from hfg.engine.model.room import Room
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.vertex import Vertex
 from hfg.errors import EngineInternalError
@@ -40,7 +46,6 @@ __all__ = [
     "RECORDED",
     "REMOVED",
     "RESTING",
-    "SAME_MOMENT_S",
     "STARTING",
     "TORN_DOWN",
     "UNREADY",
@@ -69,8 +74,6 @@ NO_CALLS: Final = FULL  # the least of them
 FIRES_NO_MORE: Final = ENDED | DISABLED | REMOVED | TORN_DOWN | UNWIRED | FUTILE  # whatever comes to it
 
 AMID_NOTHING: Final = ("", "edit", "over")  # values of Worker.busy: automatic events leave at once (A9)
-
-SAME_MOMENT_S: Final = 1e-9  # times that differ by less are one: sums of floats do
 
 
 class Worker(Vertex["Worker"]):
@@ -104,54 +107,32 @@ class Worker(Vertex["Worker"]):
         "active_timer",
         "ahead",
         "attempts",
-        "backoff_timer",
         "blocked",
         "busy",
         "call_edge",
-        "call_number",
         "caller",
         "calls",
-        "calls_failed",
-        "carrier",
-        "deferred",
-        "end_firings",
-        "end_stamp",
+        "counts",
+        "ending",
         "events_due",
-        "failed",
-        "firings",
+        "execution",
         "flights",
         "follows",
-        "full_edges",
-        "gate_next",
-        "generator",
-        "given_up",
-        "grid_start",
         "halt",
         "held",
-        "in_flight",
         "inputs",
-        "is_up",
-        "job",
-        "limit_timer",
+        "lifecycle",
         "listened",
         "meter",
-        "next_period",
-        "next_start",
         "observed",
         "on_idle",
-        "opening",
         "outputs",
-        "pending_end",
         "placed",
         "queued",
-        "rate_timer",
+        "rate",
         "region",
-        "remembered",
-        "restarts",
-        "retries",
         "right",
-        "room_waiters",
-        "silent",
+        "room",
         "speaks",
         "special",
         "stamp",
@@ -160,8 +141,6 @@ class Worker(Vertex["Worker"]):
         "tasks",
         "ticket",
         "unfit",
-        "waiting_room",
-        "watchers",
         "written",
     )
 
@@ -179,7 +158,11 @@ class Worker(Vertex["Worker"]):
         self._has_no_place()
         self._is_looked_at_by_nobody()
         self._has_not_fired()
-        self._has_no_timers()
+        self.counts = Counts()
+        self.rate = Rate()
+        self.room: Room[Worker] = Room(self)
+        self.lifecycle = Lifecycle()
+        self.execution = Execution()
         self.flights: Flights[Worker] | None = None  # of a node that allows several firings under way (F14)
         self.tasks: Any = None
         self.attempts: Attempts | None = None  # at its firing, where one that fails is tried again (X1)
@@ -195,10 +178,6 @@ class Worker(Vertex["Worker"]):
         self.caller: EventEdge | None = None
         self.queued = False
         self.follows = False
-        self.full_edges = 0
-        self.waiting_room = 0  # its code awaits trigger_wait
-        self.room_waiters: list[Callable[[], None]] | None = None
-        self.watchers: dict[Worker, None] | None = None  # held back by full queues, and in no ring while this works
         self.on_idle: list[Callable[[], None]] | None = None  # what waits until it is not busy
 
     def _is_looked_at_by_nobody(self) -> None:
@@ -219,31 +198,10 @@ class Worker(Vertex["Worker"]):
         self.held = False  # its inputs are released when its outputs are processed (F5 sequential)
         self.written: list[Entry | None] | None = None
         self.events_due: list[tuple[str, Any]] | None = None
-        self.remembered: dict[str, Any] | None = None  # what the firing under way has taken, if `failed` is to tell
-        self.end_stamp: float | None = None  # of the firing that ended it, and so of END (T5)
-        self.given_up = False  # a source that counts as ended, though it has not said END (R5)
-        self.pending_end = False  # END leaves as soon as the outputs are free (F4)
-        self.deferred: list[int] | None = None  # modifiers drained before END was sent (F12)
-        self.is_up = False  # its setup has begun, its teardown has not
-        self.opening = False  # its setup is under way
-        self.generator: Any = None
-        self.carrier: Any = None
+        self.ending: Ending | None = None  # from its last firing on
         self.call_edge: Any = None
-        self.in_flight = False  # its code waits or runs in a thread
-        self.job: Any = None  # what its thread is doing for it
         self.ticket = 0  # which firing or call a late result belongs to (X2)
-        self.firings = self.silent = self.end_firings = self.call_number = 0
-        self.failed = self.calls_failed = self.retries = self.restarts = 0
-
-    def _has_no_timers(self) -> None:
-        self.grid_start: float | None = None  # when its first firing with a rate began, and so its grid (F11)
-        self.next_period = 0  # of that grid: the first in which it may start again
-        self.next_start = 0.0  # when that begins
-        self.gate_next = float("-inf")  # when its last firing began, for a throttling gate
-        self.rate_timer: Any = None
-        self.limit_timer: Any = None
-        self.backoff_timer: Any = None
-        self.active_timer: Any = None
+        self.active_timer: Timer | None = None  # A12
 
     # --- its place in the plan (R4) ---------------------------------------------------------------------------------
 
@@ -298,7 +256,8 @@ class Worker(Vertex["Worker"]):
 
     def leave_plan(self) -> None:
         """An edit took it out of the graph: it moves no more, whatever still comes to it."""
-        self.pending_end = False
+        if self.ending is not None:
+            self.ending.call_off()
         self.block(TORN_DOWN | REMOVED)
         self.leave_queue()
         self.step = Worker.dequeued
@@ -307,15 +266,14 @@ class Worker(Vertex["Worker"]):
         """The run is over: what is queued already does nothing, and nobody waits for room any more."""
         self.blocked |= TORN_DOWN
         self.placed = False
-        for waiter in self.room_waiters or ():
-            waiter()
+        self.room.tell_waiters()
 
     def cancel_timers(self) -> None:
         """Nothing is to come of it any more."""
-        for timer in (self.rate_timer, self.limit_timer, self.backoff_timer, self.active_timer):
-            if timer is not None:
-                timer.cancel()
-        self.rate_timer = self.limit_timer = self.backoff_timer = self.active_timer = None
+        self.rate.end_wait()
+        self.execution.end_limit()
+        self.lifecycle.end_rest()
+        self.time_activity(None)
         if self.attempts is not None:
             self.attempts.cancel()
         for flight in self.flights or ():
@@ -374,8 +332,8 @@ class Worker(Vertex["Worker"]):
     def unplace(self) -> None:
         """The same, and no timer that would give a place."""
         self.placed = False
-        if self.rate_timer is not None:
-            self.forget_rate()
+        if self.blocked & RATE:
+            self.rate_over()
 
     def no_turn(self) -> None:
         """It has had its turn, and all that it was enabled for is done by that."""
@@ -406,84 +364,13 @@ class Worker(Vertex["Worker"]):
     def wait_for_rate(self, when: float, over: Callable[[], None]) -> None:
         """F11: nothing starts before `when`."""
         self.blocked |= RATE
-        self.rate_timer = self.core.host.call_at(when, over)
+        self.rate.wait(self.core.host.call_at(when, over))
 
     def rate_over(self) -> None:
-        """The time has come for which a rate held it."""
-        self.rate_timer = None
+        """The time has come for which a rate held it, or what it would have let start is gone."""
+        self.rate.end_wait()
         self.blocked &= ~RATE
-        if self.watchers is not None:
-            self.tell_watchers()
-
-    def forget_rate(self) -> None:
-        """What the rate would have let start is gone."""
-        self.rate_timer.cancel()
-        self.rate_over()
-
-    def note_start(self, rate_hz: float) -> None:
-        """F11: a firing starts now; the next one may in the next period of the grid that the first one began.
-
-        Each place of the grid is found from its beginning, so that errors of floats never add up.
-        """
-        now = self.core.now()
-        if self.grid_start is None:
-            self.grid_start = now
-        period = int((now - self.grid_start + SAME_MOMENT_S) * rate_hz)
-        self.next_period = max(self.next_period, period) + 1  # (a clock as large as the date has fewer digits)
-        self.next_start = self.grid_start + self.next_period / rate_hz
-
-    def note_gated_start(self, when: float) -> None:
-        """A11: an idle rate counts from here; minus infinity: from the next firing."""
-        self.gate_next = when
-
-    def queue_full(self) -> None:
-        """F8: one more queue of its events is full."""
-        self.full_edges += 1
-        self.core.full_edges += 1
-        self.core.suspects[self] = None
-        self.block(FULL)
-
-    def queue_free(self) -> bool:
-        """F8: one less; whether none is left. Code that waits for room is told."""
-        self.full_edges -= 1
-        self.core.full_edges -= 1
-        if self.full_edges:
-            return False
-        if self.watchers is not None:
-            self.tell_watchers()
-        self.room_for_all()
-        return True
-
-    def room_for_all(self) -> None:
-        """Tell code that waits for room behind the worker's events."""
-        waiters, self.room_waiters = self.room_waiters, None
-        for waiter in waiters or ():
-            waiter()
-
-    def when_room(self, waiter: Callable[[], None]) -> None:
-        """Tell this waiter when no queue behind the worker's events is full."""
-        if self.room_waiters is None:
-            self.room_waiters = []
-        self.room_waiters.append(waiter)
-
-    def code_waits_for_room(self, how_many: int) -> None:
-        """F8: so much more of its own code awaits `trigger_wait`."""
-        self.waiting_room += how_many
-        self.core.waiting_room += how_many
-        self.core.suspects[self] = None
-        self.tell_watchers()
-
-    def be_watched_by(self, held: Worker) -> None:
-        """F8: what is held back by a full queue is in no ring as long as code of this one goes on, or its timer."""
-        if self.watchers is None:
-            self.watchers = {}
-        self.watchers[held] = None
-
-    def tell_watchers(self) -> None:
-        """F8: that is over, so they are looked at again."""
-        if self.watchers is not None:
-            self.core.suspects.update(self.watchers)
-            self.watchers = None
+        self.room.tell_watchers()
 
     # --- what is under way (F3, F9, X2) -----------------------------------------------------------------------------
 
@@ -501,7 +388,7 @@ class Worker(Vertex["Worker"]):
         """A firing begins: what it takes, and when that was made, is still to be seen."""
         self.placed = False
         self.busy = "firing"
-        self.firings += 1
+        self.counts.firings += 1
         self.ticket += 1
         self.special = False
 
@@ -515,10 +402,6 @@ class Worker(Vertex["Worker"]):
         self.taken = edges
         self.stamp = stamp
 
-    def fire_silently(self) -> None:
-        """F4(2): the firing under way is silent."""
-        self.silent += 1
-
     def write(self, position: int, entry: Entry) -> None:
         """The firing has written to one output; it leaves when the firing is over."""
         if self.written is None:
@@ -529,41 +412,10 @@ class Worker(Vertex["Worker"]):
         """The firing or call is over, but for what it releases."""
         self.busy = "over"
 
-    def keep_generator(self, generator: object) -> None:
-        """What a source draws its next values from; None: it has ended, or begins at its next firing."""
-        self.generator = generator
-
-    def count_end_firing(self) -> None:
-        """The firing under way is the one with which it ends."""
-        self.end_firings += 1
-
-    def count_failure(self, *, of_call: bool = False) -> None:
-        """Its code has failed, in a slot call or elsewhere (X1)."""
-        if of_call:
-            self.calls_failed += 1
-        else:
-            self.failed += 1
-
-    def count_retry(self) -> None:
-        """A firing that has failed is tried again (X1)."""
-        self.retries += 1
-
     def begin_restart(self) -> None:
         """X1: it is torn down, and set up after a pause."""
-        self.restarts += 1
+        self.counts.add_restart()
         self.block(BACKOFF)
-
-    def time_backoff(self, timer: Timer | None) -> None:
-        """X1: when this timer is over it is set up again; None: it is over."""
-        self.backoff_timer = timer
-
-    def be_up(self, up: bool) -> None:
-        """Whether its setup has begun and its teardown has not."""
-        self.is_up = up
-
-    def be_opening(self, opening: bool) -> None:
-        """Whether its setup is under way."""
-        self.opening = opening
 
     def take_written(self) -> list[Entry | None] | None:
         """What the firing has written leaves now, or never."""
@@ -573,7 +425,7 @@ class Worker(Vertex["Worker"]):
     def begin_call(self, edge: Edge, stamp: float) -> None:
         """A slot call begins, for the oldest token of the edge."""
         self.busy = "call"
-        self.call_number += 1
+        self.counts.calls += 1
         self.ticket += 1
         self.call_edge = edge
         self.stamp = stamp
@@ -637,7 +489,8 @@ class Worker(Vertex["Worker"]):
         self.stamp = None
 
     def give_up_firing(self) -> None:
-        """X2: what its code still brings is too late."""
+        """X2: what its code still brings is too late, and has no limit any more."""
+        self.execution.end_limit()
         self.ticket += 1
 
     def mark_special(self) -> None:
@@ -646,30 +499,22 @@ class Worker(Vertex["Worker"]):
 
     def set_out(self) -> None:
         """Its code waits, or runs in a thread, and its outcome comes later."""
-        self.in_flight = True
+        self.execution.in_flight = True
         self.core.set_out()
-
-    def take_job(self, job: object) -> None:
-        """A thread works for it: by this job, perhaps with others of its region."""
-        self.job = job
 
     def come_back(self) -> None:
         """Its code is over, or given up; a node that a thread has worked with sees its activity again."""
-        self.in_flight = False
+        execution = self.execution
+        execution.in_flight = False
         self.core.come_back()
-        if self.watchers is not None:
-            self.tell_watchers()
-        if self.job is not None:
+        self.room.tell_watchers()
+        if execution.job is not None:
             self.leave_job()
 
     def leave_job(self) -> None:
         """What the thread did for it is over."""
-        self.job = None
-        self.node._active = self.active
-
-    def be_carried(self, carrier: object) -> None:
-        """Its coroutines run in this dormant task from now on; None: the next one makes another."""
-        self.carrier = carrier
+        self.execution.take_job(None)
+        self.show_activity()
 
     # --- by a fast path (see the wing `fusion`) ----------------------------------------------------------------------
 
@@ -696,19 +541,6 @@ class Worker(Vertex["Worker"]):
         """
         self.busy = doing
 
-    def stamp_with(self, stamp: float) -> None:
-        """What its code sends by itself in a wave is of this time."""
-        self.stamp = stamp
-
-    def has_fired(self, times: int, silently: int = 0) -> None:
-        """Count firings that a region has seen to."""
-        self.firings += times
-        self.silent += silently
-
-    def was_called(self, times: int) -> None:
-        """Count slot calls that a region has seen to."""
-        self.call_number += times
-
     def hold(self, edges: tuple[Any, ...]) -> None:
         """F5: what it has sent is not processed by all; from these edges it took, and they are released by that."""
         self.held = True
@@ -724,7 +556,7 @@ class Worker(Vertex["Worker"]):
     def be_amid_firing(self, edges: tuple[Any, ...], stamp: float) -> None:
         """A firing that a region had begun is one like any other from here on; what has come in meanwhile stays."""
         self.ticket += 1
-        self.firings += 1
+        self.counts.firings += 1
         self.busy = "firing"
         self.took(edges, stamp)
 
@@ -738,7 +570,7 @@ class Worker(Vertex["Worker"]):
     def fire_plainly(self, edges: tuple[Any, ...], stamp: float) -> None:
         """It has had its turn, and fires with plain values: see `begin_firing` and `took`."""
         self.queued = self.placed = False
-        self.firings += 1
+        self.counts.firings += 1
         self.ticket += 1
         self.busy = "firing"
         self.stamp = stamp
@@ -754,13 +586,32 @@ class Worker(Vertex["Worker"]):
         self.active = self.node._active = False
         self.right = self.stamp is not None
 
+    def take_activity(self, active: bool) -> None:
+        """A6: a call by a fast path, so on the loop, has taken activity or lost it; no region fuses such a node."""
+        self.active = self.node._active = active
+
     # --- activity (A3, A5, A9) ----------------------------------------------------------------------------------------
 
     def become(self, active: bool) -> None:
         """A(v) := active; who fuses its firings looks whether activity would move now."""
         self.active = active
+        self.show_activity()
         if self.region is not None:
             self.region.disturb(self)
+
+    def show_activity(self) -> None:
+        """Let the node's own code see its activity, the only place where that is written.
+
+        Under the virtual clock code in a thread goes on seeing what was when it began, or chance would decide (R6).
+        """
+        job = self.execution.job
+        if self.node is not None and (job is None or job.held is None):
+            self.node._active = self.active
+
+    def hide_activity(self) -> None:
+        """The run is over, and the node belongs to none."""
+        if self.node is not None:
+            self.node._active = False
 
     def keep_right(self, right: bool) -> None:
         """A3: whether it may still carry activity that A5 took earlier in the firing or call under way."""
@@ -772,34 +623,10 @@ class Worker(Vertex["Worker"]):
             self.events_due = []
         self.events_due.append((name, value))
 
-    def remember(self, taken: dict[str, Any]) -> None:
-        """The firing has taken these values; should it fail, that is told (X1)."""
-        self.remembered = taken
-
-    def recall(self) -> dict[str, Any]:
-        """What the firing had taken; it is over, and holds that no longer."""
-        taken, self.remembered = self.remembered, None
-        return taken or {}
-
     def take_events(self) -> list[tuple[str, Any]]:
         """The automatic events that have arisen, to be sent now."""
         due, self.events_due = self.events_due, None
         return due or []
-
-    def defer(self, modifier: int) -> None:
-        """F12: a modifier that was drained acts behind the worker's own END."""
-        assert self.deferred is not None
-        self.deferred.append(modifier)
-
-    def defer_none(self) -> None:
-        """A14: what was drained brings no activity any more."""
-        if self.deferred:
-            self.deferred = [0] * len(self.deferred)
-
-    def take_deferred(self) -> list[int]:
-        """Its END has been sent, or never will be: what was drained acts now."""
-        deferred, self.deferred = self.deferred, None
-        return deferred or []
 
     def time_activity(self, timer: Timer | None) -> None:
         """A12: how long it has been active is measured by this timer from now on, or not at all; the last is over."""
@@ -807,38 +634,27 @@ class Worker(Vertex["Worker"]):
             self.active_timer.cancel()
         self.active_timer = timer
 
-    def active_long_enough(self) -> None:
-        """A12: the timer has come to its end."""
-        self.active_timer = None
-
     # --- its end, and beginning afresh (F4, F10, F12, X1) -------------------------------------------------------------
 
     def end(self, *, given_up: bool = False) -> None:
         """From here on it fires no more, and what comes is drained (F12); `given_up`: it will not say END (R5)."""
         self.block(ENDED)
-        self.deferred = []
-        self.given_up = self.given_up or given_up
+        self.ending = Ending(given_up=given_up or (self.ending is not None and self.ending.given_up))
         for edge in self.in_edges:
             edge.source.changed()  # whose fast paths do not look whether what they send is drained
 
     def promise_end(self, stamp: float | None) -> None:
         """END follows as soon as the outputs are free; with this stamp (T5)."""
-        self.end_stamp = stamp
-        self.pending_end = True
+        assert self.ending is not None
+        self.ending.promise(stamp)
         for edges in self.out_edges:
             for edge in edges:
                 if edge.target.region is not None:
                     edge.target.region.expect_end()
 
-    def send_end_now(self) -> None:
-        """END is sent, as a sending of its own."""
-        self.pending_end = False
-        self.stamp = self.end_stamp
-
-    def not_ended(self) -> None:
-        """It starts afresh: it has not ended, nor have the inputs that it must have, nor have its events."""
-        self.pending_end = self.given_up = False
-        self.deferred = None
+    def start_over(self) -> None:
+        """It has not ended, nor have the inputs that it must have, nor have its events."""
+        self.ending = None
         if self.flights is not None:
             self.flights.begin_afresh()
             self.crowd()
@@ -847,21 +663,6 @@ class Worker(Vertex["Worker"]):
         for edge in self.event_edges():
             if edge.renew is not None and edge.complete is None:
                 edge.renew()
-
-    def limit(self, timer: Timer | None) -> None:
-        """X2: the firing may take as long as this timer."""
-        self.limit_timer = timer
-
-    def in_time(self) -> None:
-        """What had a time limit is over in time."""
-        timer, self.limit_timer = self.limit_timer, None
-        if timer is not None:
-            timer.cancel()
-
-    def out_of_time(self) -> None:
-        """X2: what had a time limit has taken longer."""
-        self.limit_timer = None
-        self.ticket += 1
 
     def when_idle(self, callback: Callable[[], None]) -> None:
         """Call back when nothing is under way, before the next firing or call."""
@@ -886,6 +687,11 @@ class Worker(Vertex["Worker"]):
         """Whether code of a firing that goes on beside others is not over."""
         return self.flights is not None and self.flights.unfinished
 
+    @property
+    def pending_end(self) -> bool:
+        """Whether END follows as soon as the outputs are free (F4)."""
+        return self.ending is not None and self.ending.pending
+
     def send_as(self, stamp: float | None) -> float | None:
         """What it sends has this stamp from now on (T5); gives back the one before, of a call that is under way."""
         before, self.stamp = self.stamp, stamp
@@ -900,19 +706,20 @@ class Worker(Vertex["Worker"]):
 
     def most_under_way(self) -> int:
         """How many there ever were at once."""
-        return min(1, self.firings) if self.flights is None else self.flights.most
+        return min(1, self.counts.firings) if self.flights is None else self.flights.most
 
     def codes_at_work(self) -> int:
         """How much of its code waits or runs in a thread: one firing or call, or several firings, and tasks."""
-        firings = self.in_flight + (0 if self.flights is None else self.flights.working)
+        firings = self.execution.in_flight + (0 if self.flights is None else self.flights.working)
         return firings + (0 if self.tasks is None else len(self.tasks))
 
     def codes_waiting_for_room(self) -> int:
         """How much of that waits until a queue has room (F8)."""
         tasks = 0 if self.tasks is None else self.tasks.waiting_room
-        if not self.waiting_room:
+        waiting = self.room.waiting
+        if not waiting:
             return int(tasks)
-        return tasks + (int(self.in_flight) if self.flights is None else min(self.waiting_room, self.flights.working))
+        return tasks + (int(self.execution.in_flight) if self.flights is None else min(waiting, self.flights.working))
 
     def start_tasks(self, tasks: object) -> None:
         """Its code starts a task for the first time."""
@@ -956,10 +763,10 @@ class Worker(Vertex["Worker"]):
         """Whether something of it is under way or will be, without anybody else; not who only waits for room (F8)."""
         return (
             self.queued
-            or (self.busy != "" and not self.waiting_room)
-            or (self.flights is not None and self.flights.unfinished and not self.waiting_room)
-            or self.rate_timer is not None
-            or self.backoff_timer is not None
+            or (self.busy != "" and not self.room.waiting)
+            or (self.flights is not None and self.flights.unfinished and not self.room.waiting)
+            or bool(self.blocked & RATE)
+            or self.lifecycle.backoff_timer is not None
             or (self.active_timer is not None and self.timeout_leads_somewhere())
             or (self.tasks is not None and self.tasks.move)
         )
@@ -977,8 +784,10 @@ class Worker(Vertex["Worker"]):
         for holds, relation in self._relations():
             if not holds:
                 raise EngineInternalError(f'node "{self.path}": {relation}')
-        if self.flights is not None:
-            self.flights.check_invariants(self.path)
+        records = (self.counts, self.lifecycle, self.execution, self.ending, self.flights)
+        for record in records:
+            if record is not None:
+                record.check_invariants(self.path)
         if not self.blocked & (ENDED | TORN_DOWN):  # who has ended waits for nothing any more (F12)
             missing = sum(1 for edge in self.live_inputs if not edge.untaken)
             self.inputs.check_invariants(missing, f'inputs of "{self.path}"')
@@ -992,10 +801,12 @@ class Worker(Vertex["Worker"]):
             yield self.call_edge is None, "it rests, but is amid a slot call"
             yield not self.follows or self.queued, "it is to go next, but for nothing (R2)"
         yield self.outputs.missing > 0 or not self.held, "it holds its inputs for outputs that are free (F5)"
-        yield bool(self.blocked & ENDED) or not self.pending_end, "END is to follow, but it has not ended (F4)"
-        yield bool(self.blocked & ENDED) or self.deferred is None, "modifiers wait for its END, but it has not ended"
-        yield bool(self.full_edges) == bool(self.blocked & FULL), "held back by a full queue that is none (F8)"
-        yield self.rate_timer is None or bool(self.blocked & RATE), "a rate's timer runs, but no rate holds it (F11)"
+        yield bool(self.blocked & ENDED) or self.ending is None, "END is to follow, but it has not ended (F4)"
+        yield bool(self.room.full_edges) == bool(self.blocked & FULL), "held back by a full queue that is none (F8)"
+        yield (
+            (self.rate.timer is not None) == bool(self.blocked & RATE),
+            "a rate holds it without a timer, or not (F11)",
+        )
 
     def _relations_of_its_place(self) -> Iterator[tuple[bool, str]]:
         """What holds of its place in the agenda and in the run queue (F1, F9)."""

@@ -81,14 +81,14 @@ def glance_at(engine: Engine) -> Glance:
             NodeGlance(
                 worker.path,
                 worker.group.name,
-                worker.firings + worker.call_number,
+                worker.counts.done,
                 0.0 if meter is None else meter.busy_s,
                 sum([edge.untaken for edge in (*worker.in_edges, *worker.slot_edges)]),
-                worker.failed + worker.calls_failed,
+                worker.counts.failed,
                 worker.active,
                 doing(worker),
                 worker.firings_under_way(),
-                worker.retries,
+                worker.counts.retries,
             )
         )
     return Glance(

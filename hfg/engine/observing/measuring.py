@@ -180,7 +180,7 @@ class Measuring:
             self._engine.core.settle_counts()
             for worker in self._workers():
                 meter = self._meter(worker)
-                meter.before, meter.mark = meter.mark, worker.firings + worker.call_number
+                meter.before, meter.mark = meter.mark, worker.counts.done
             self._before = self._marks
             self._mark_edges()
 
@@ -225,16 +225,16 @@ class Measuring:
     def _node(self, worker: Worker, passed: float, machine: float, over: float) -> tuple[NodeStatistics, float]:
         meter = self._fold(worker)
         busy = meter.busy_s
-        pieces = worker.firings + worker.call_number
+        pieces = worker.counts.done
         node = NodeStatistics(
             group=worker.group.name,
-            firings=worker.firings,
-            processed=worker.firings - worker.silent - worker.end_firings,
-            silent=worker.silent,
-            calls=worker.call_number,
-            failed=worker.failed + worker.calls_failed,
-            retries=worker.retries,
-            restarts=worker.restarts,
+            firings=worker.counts.firings,
+            processed=worker.counts.processed,
+            silent=worker.counts.silent,
+            calls=worker.counts.calls,
+            failed=worker.counts.failed,
+            retries=worker.counts.retries,
+            restarts=worker.counts.restarts,
             under_way=worker.firings_under_way(),
             most_under_way=worker.most_under_way(),
             active=worker.active,

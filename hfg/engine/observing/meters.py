@@ -127,7 +127,7 @@ class Meter:
         self.delays = Distribution()
         self.waiting: dict[str, float] = {}
         self.active = 0.0
-        self.mark = self.before = worker.firings + worker.call_number
+        self.mark = self.before = worker.counts.done
         self._fresh: list[float] = []
         self._fresh_delays: list[float] = []
         self._fresh_busy = 0.0
@@ -143,8 +143,8 @@ class Meter:
             kind = worker.type.process_kind
             if kind in ("generator", "async generator"):
                 worker.process = self._generators(self.code)
-                if worker.generator is not None:
-                    worker.keep_generator(self._drawn(worker.generator))
+                if worker.execution.generator is not None:
+                    worker.execution.draw_from(self._drawn(worker.execution.generator))
             else:
                 worker.process = self._calls(self.code)
         self.measure_slots()
@@ -199,7 +199,7 @@ class Meter:
 
     def _done(self) -> int:
         worker = self.worker
-        return worker.firings - worker.silent - worker.end_firings + worker.call_number
+        return worker.counts.processed + worker.counts.calls
 
     def _calls(self, code: Callable[..., Any]) -> Callable[..., Any]:
         worker = self.worker

@@ -256,7 +256,7 @@ class Recorder(Listener):
     def _find_sender(self, looker: _Looker) -> None:
         workers = self._taps.workers(looker)
         looker.worker = workers[0] if len(workers) == 1 else None
-        looker.silent = 0 if looker.worker is None else looker.worker.silent
+        looker.silent = 0 if looker.worker is None else looker.worker.counts.silent
 
     # --- what the tokens themselves do not say ------------------------------------------------------------------------
 
@@ -269,7 +269,7 @@ class Recorder(Listener):
                 token = _told(token, last=True)
             elif amid != "firing":
                 called = amid == "call" or (not amid and began is not None)  # the fast path of calls says no more
-                token = _told(token, call=worker.call_number) if called else _told(token, beside=True)
+                token = _told(token, call=worker.counts.calls) if called else _told(token, beside=True)
             elif worker.is_source and began is not None and (began != token.stamp or _waited(worker)):
                 token = _told(token, began=None if began == token.stamp else began, waited=_waited(worker))
         put(token)
@@ -284,8 +284,8 @@ class Recorder(Listener):
             put(_told(token, waited=True) if worker.busy == "over" and _waited(worker) else token)
             return
         began = token.stamp if worker.stamp is None else worker.stamp
-        last, silent = bool(worker.blocked & ENDED), worker.silent != looker.silent
-        looker.silent = worker.silent
+        last, silent = bool(worker.blocked & ENDED), worker.counts.silent != looker.silent
+        looker.silent = worker.counts.silent
         waited = not last and _waited(worker)
         if last or silent or waited or began != token.stamp:
             began = None if began == token.stamp else began

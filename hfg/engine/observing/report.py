@@ -200,13 +200,13 @@ def node_reports(core: Core) -> dict[str, NodeReport]:
     core.settle_counts()
     return {
         worker.path: NodeReport(
-            firings=worker.firings,
-            processed=worker.firings - worker.silent - worker.end_firings,
-            silent=worker.silent,
-            calls=worker.call_number,
-            failed=worker.failed + worker.calls_failed,
-            retries=worker.retries,
-            restarts=worker.restarts,
+            firings=worker.counts.firings,
+            processed=worker.counts.processed,
+            silent=worker.counts.silent,
+            calls=worker.counts.calls,
+            failed=worker.counts.failed,
+            retries=worker.counts.retries,
+            restarts=worker.counts.restarts,
             most_under_way=worker.most_under_way(),
             active=worker.active,
             ended=bool(worker.blocked & ENDED),

@@ -14,7 +14,7 @@ import msgspec
 
 from hfg.base.token import Token
 from hfg.engine.model import Core, Gate, Scope
-from hfg.engine.model.worker import AMID_NOTHING, RESTING, Worker
+from hfg.engine.model.worker import AMID_NOTHING, RATE, RESTING, Worker
 from hfg.engine.rules import doing
 from hfg.engine.rules.agenda import consider, must_wait
 from hfg.engine.rules.modifiers import automatic, set_active, touch
@@ -80,7 +80,7 @@ def _time_out_later(worker: Worker, active: bool) -> None:
 
 
 def _time_out(worker: Worker) -> None:
-    worker.active_long_enough()
+    worker.time_activity(None)
     event = worker.events.get("timeout")
     if event is None:
         return
@@ -101,8 +101,8 @@ def gate_changed(gates: Iterable[Gate]) -> None:
 
 def rest(worker: Worker) -> None:
     """Let a source rest, or go on, as its gates say now."""
-    if worker.rate_timer is not None:
-        worker.forget_rate()
+    if worker.blocked & RATE:
+        worker.rate_over()
     if any(gate.idle_rate_hz is None and not gate.state.active for gate in worker.gates_over):
         if not worker.blocked & RESTING:
             worker.block(RESTING)
@@ -134,7 +134,6 @@ def scopes_changed(core: Core) -> None:
         assert owner is not None
         # the scope's worker shows A(subgraph), but nothing is transferred by itself
         owner.become(active)
-        owner.node._active = active
         automatic(owner, "activated" if active else "deactivated")
         _time_out_later(owner, active)
         flush_automatic(owner)
@@ -169,7 +168,8 @@ def deactivate_inside(scope: Scope, cause: Literal["sent", "slot"]) -> None:
 def _forget(worker: Worker) -> None:
     """Take the right of A3, and what the tokens that were drained are to do (F12)."""
     worker.keep_right(False)
-    worker.defer_none()
+    if worker.ending is not None:
+        worker.ending.strip()
 
 
 def _strip(edge: AnyEdge, *, also_taking: bool) -> None:

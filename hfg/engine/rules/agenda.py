@@ -6,7 +6,8 @@ Plain functions over the run's state; they queue workers and never run a node's 
 from __future__ import annotations
 
 from hfg.engine.model import Core
-from hfg.engine.model.worker import DISABLED, FULL, NO_CALLS, SAME_MOMENT_S, UNREADY, Worker
+from hfg.engine.model.rate import SAME_MOMENT_S
+from hfg.engine.model.worker import DISABLED, FULL, NO_CALLS, UNREADY, Worker
 from hfg.ports.edges import Edge, EventEdge
 
 __all__ = [
@@ -57,11 +58,11 @@ def let_follow(core: Core, since: int) -> None:
 
 def must_wait(worker: Worker) -> bool:
     """F11 and A11: nothing starts before the rate allows it; the timer is set only when something would."""
-    when = worker.next_start
+    when = worker.rate.next_start
     if worker.is_source:
         for gate in worker.gates_over:
             if gate.idle_rate_hz is not None and not gate.state.active:
-                when = max(when, worker.gate_next + 1.0 / gate.idle_rate_hz)
+                when = max(when, worker.rate.gate_next + 1.0 / gate.idle_rate_hz)
     core = worker.core
     if when <= core.now() + SAME_MOMENT_S:
         return False
@@ -117,19 +118,24 @@ def add_call(target: Worker, edge: Edge) -> None:
 def note_full(edge: EventEdge) -> None:
     """F8: a live `wait` edge that holds its capacity or more keeps its source from starting anything new."""
     if edge.fill():
-        edge.source.queue_full()
+        edge.source.room.fill()
+        edge.source.block(FULL)
 
 
 def freed(edge: EventEdge) -> None:
     """A token was taken from the queue: its source may go on if no other queue of it is full (F8)."""
-    if edge.full and edge.free() and edge.source.queue_free():
+    if edge.full and edge.free() and edge.source.room.free():
         unblock(edge.source, FULL)
 
 
 def idle_again(worker: Worker, *, asked: bool = False) -> None:
     """A firing, call or question is over: see what is next."""
     worker.rest()
-    if worker.pending_end and (not worker.outputs.missing or worker.blocked & DISABLED):
+    if (
+        worker.ending is not None
+        and worker.ending.pending
+        and (not worker.outputs.missing or worker.blocked & DISABLED)
+    ):
         worker.core.upstairs.send_end(worker)  # its outputs became free during a slot call
     if worker.on_idle is not None:
         worker.let_others()

@@ -33,7 +33,7 @@ def call(worker: Worker) -> None:
     name = edge.port_name
     if core.trace is not None:
         now = core.now()
-        core.trace(CallStarted(now, worker.path, worker.call_number, name, edge.label))
+        core.trace(CallStarted(now, worker.path, worker.counts.calls, name, edge.label))
         core.trace(TokenTaken(now, edge.label, token))
     if token.activity:
         _receive(worker, edge, token.activity)
@@ -122,7 +122,7 @@ def finish_call(worker: Worker, outcome: CallOutcome) -> None:
     derive_scopes(core)
     flush_automatic(worker)
     if core.trace is not None:
-        core.trace(CallEnded(core.now(), worker.path, worker.call_number, outcome))
+        core.trace(CallEnded(core.now(), worker.path, worker.counts.calls, outcome))
     edge = worker.end_call()
     if type(edge) is SyncEdge and edge.token is None:  # else it is the next one, which a pipelined edge has let in
         release((edge,))

@@ -53,10 +53,10 @@ def begin(
     assert stamp is not None
     if kind == "end":  # behind all that are under way (F14)
         drop_taken(worker, edges, tokens)
-        flights.end(worker.firings, stamp)
+        flights.end(worker.counts.firings, stamp)
         worker.crowd()
     else:
-        flight = Flight(worker, worker.firings, stamp)
+        flight = Flight(worker, worker.counts.firings, stamp)
         flights.begin(flight)
         worker.crowd()
         if kind == "process":
@@ -64,7 +64,7 @@ def begin(
         if refused is not None:
             _failed(flight, refused)
         elif kind == "silent":
-            worker.fire_silently()
+            worker.counts.add_silent()
             flight.be_over("silent")
             flights.over(flight)
         else:
@@ -143,7 +143,7 @@ def _found_end(flight: Flight) -> None:
     if flights.ending is None:
         flights.end(flight.number, flight.stamp, flight.take_written())
     else:  # it has found that twice
-        worker.count_end_firing()
+        worker.counts.add_end_firing()
         _tell_end(flight, "ended")
     worker.crowd()
     _rest(worker)
@@ -163,7 +163,7 @@ def _failed(flight: Flight, error: BaseException) -> None:
     flight.take_written()
     if try_again(worker, flight.attempts, flight.number, error, again):
         return
-    worker.count_failure()
+    worker.counts.add_failure()
     problem = errors.as_node_error(worker, f"firing {flight.number}", error)
     policy = errors.judge(worker, problem)
     if policy == "stop":
@@ -258,8 +258,9 @@ def _leave(flight: Flight) -> None:
     _tell_end(flight, flight.outcome)
     if flight.number != _flights(worker).end_number:
         return
-    if worker.given_up:
-        worker.take_deferred()  # nobody is left who would hear END (R5)
+    assert worker.ending is not None
+    if worker.ending.given_up:
+        worker.ending.take_deferred()  # nobody is left who would hear END (R5)
     else:
         worker.promise_end(flight.stamp)
 
@@ -298,7 +299,7 @@ def _end(worker: Worker) -> None:
         return
     flight = Flight(worker, flights.end_number, flights.take_ending())
     flight.be_given(flights.end_written)
-    worker.count_end_firing()
+    worker.counts.add_end_firing()
     worker.end()
     drain_left(worker.in_edges)
     hook = worker.node._hook("end")

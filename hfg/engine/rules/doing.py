@@ -67,7 +67,7 @@ def afresh(worker: Worker) -> None:
 def go_on(worker: Worker) -> None:
     """Begin the do-activity if it is due, and neither the last one nor the state of its node keeps it back."""
     tasks, core = worker.tasks, worker.core
-    if not tasks.doing.may_begin() or tasks.ending or not worker.is_up or worker.opening:
+    if not tasks.doing.may_begin() or tasks.ending or not worker.lifecycle.is_up or worker.lifecycle.opening:
         return
     if worker.blocked & _NOT_NOW or core.over:
         return

@@ -31,7 +31,7 @@ def ends_itself(worker: Worker, error: BaseException | None) -> bool:
 
 def end_itself(worker: Worker) -> None:
     """F2: end amid a firing of its own; what that has written before leaves with what `end()` writes (F4)."""
-    worker.keep_generator(None)  # nothing is left to close
+    worker.execution.close_generator()  # nothing is left to close
     end(worker, (), ())
 
 
@@ -39,11 +39,13 @@ def end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> N
     """F4(1): `end()` is called, what it writes leaves as one full firing, END follows (F12 begins here)."""
     core = worker.core
     drop_taken(worker, edges, tokens)
-    worker.count_end_firing()
+    worker.counts.add_end_firing()
     worker.end()
-    worker.in_time()
+    worker.execution.end_limit()
     drain_left(worker.in_edges)
-    if worker.deferred:  # what was drained has yet to act, and subgraphs around are active by it meanwhile (G2)
+    if (
+        worker.ending is not None and worker.ending.deferred
+    ):  # what was drained has yet to act, and subgraphs around are active by it meanwhile (G2)
         touch(core, worker.scopes)
         derive_scopes(core)
     hook = worker.node._hook("end") if worker.node is not None else None
@@ -84,8 +86,8 @@ def drain_left(edges: Sequence[Any]) -> None:
             edge.count_drained()
             if core.trace is not None:
                 core.trace(TokenDrained(core.now(), edge.label, token))
-            if token.activity and worker.deferred is not None:
-                worker.defer(token.activity)
+            if token.activity and worker.ending is not None and worker.ending.deferred is not None:
+                worker.ending.defer(token.activity)
     for edge in drained:
         if type(edge) is EventEdge:
             freed(edge)
@@ -107,13 +109,14 @@ def _ended(worker: Worker, result: object, error: BaseException | None) -> None:
         announce(worker, written, processed=False)
     flush_automatic(worker)
     if core.trace is not None:
-        core.trace(FiringEnded(core.now(), worker.path, worker.firings, "ended" if error is None else "failed"))
+        core.trace(FiringEnded(core.now(), worker.path, worker.counts.firings, "ended" if error is None else "failed"))
     worker.be_over()
     release(worker.release_early())
     stamp = worker.stamp
     worker.leave()  # the firing is over; END is not part of it (A3)
-    if worker.given_up:  # amid a firing, and that is over now: nobody is left who would hear END (R5)
-        worker.take_deferred()
+    assert worker.ending is not None
+    if worker.ending.given_up:  # amid a firing, and that is over now: nobody is left who would hear END (R5)
+        worker.ending.take_deferred()
     elif worker.outputs.missing and not worker.blocked & DISABLED:
         worker.promise_end(stamp)
     else:

@@ -96,7 +96,7 @@ def fail(
         return
     if answer and retry(worker, error):
         return
-    worker.count_failure()
+    worker.counts.add_failure()
     apply_policy(worker, as_node_error(worker, what, error), answer=answer, then=then)
 
 
@@ -105,7 +105,7 @@ def fail_beside(worker: Worker, what: str, error: BaseException) -> None:
     if isinstance(error, QueueLimit):
         worker.core.host.finish("failed", error)
         return
-    worker.count_failure()
+    worker.counts.add_failure()
     problem = as_node_error(worker, what, error)
     policy = judge(worker, problem)
     if policy == "stop":
@@ -119,8 +119,8 @@ def fail_beside(worker: Worker, what: str, error: BaseException) -> None:
 
 def fail_call(worker: Worker, slot: str, error: BaseException) -> None:
     """A slot call has failed: it owes no outputs, so with every policy but `stop` it is only counted."""
-    worker.count_failure(of_call=True)
-    problem = as_node_error(worker, f"slot {slot}, call {worker.call_number}", error)
+    worker.counts.add_failure(of_call=True)
+    problem = as_node_error(worker, f"slot {slot}, call {worker.counts.calls}", error)
     policy = _policy(worker, problem)
     report_error(worker, problem.what, in_words(error), policy)
     if policy == "stop":
@@ -153,7 +153,7 @@ def judge(worker: Worker, problem: NodeError) -> str:
     """X1: what the node's policy says is told to those who listen; "stop" has ended the run."""
     core = worker.core
     policy = _policy(worker, problem)
-    if policy == "restart" and not worker.blocked & BACKOFF and worker.restarts >= worker.options.restart_limit:
+    if policy == "restart" and not worker.blocked & BACKOFF and worker.counts.restarts >= worker.options.restart_limit:
         policy = "stop"
     report_error(worker, problem.what, in_words(problem.__cause__ or problem), policy)
     if policy == "stop":
@@ -182,7 +182,7 @@ def follow(worker: Worker, policy: str, *, restarts: bool) -> None:
     if policy == "disable":
         lifecycle.disable(worker)
     elif restarts:
-        lifecycle.restart(worker, worker.options.restart_backoff_s * 2 ** (worker.restarts - 1))
+        lifecycle.restart(worker, worker.options.restart_backoff_s * 2 ** (worker.counts.restarts - 1))
 
 
 def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Callable[[], None] | None = None) -> None:
@@ -191,7 +191,7 @@ def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Call
     worker.take_written()
     if policy == "stop":
         return
-    automatic(worker, "failed", Failure(problem, worker.recall() if answer else {}))
+    automatic(worker, "failed", Failure(problem, worker.execution.recall() if answer else {}))
     if answer and policy != "disable":
         put_outputs(worker, None)
     restarts = begin_over(worker, policy)
@@ -206,14 +206,14 @@ def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Call
 
 def time_out(worker: Worker) -> None:
     """X2: the firing has taken longer than `max_duration_s`: it is given up, its late result ignored."""
-    worker.out_of_time()
+    worker.give_up_firing()
     limit = worker.options.max_duration_s
-    what = f"firing {worker.firings}{amid_element(worker)}"
+    what = f"firing {worker.counts.firings}{amid_element(worker)}"
     worker.core.code.interrupt(worker)
     problem = FiringTimeout(worker.path, what, f"it took longer than max_duration_s = {limit:g} s and was given up")
     if retry(worker, problem):
         return
-    worker.count_failure()
+    worker.counts.add_failure()
     apply_policy(worker, problem, answer=True)
 
 

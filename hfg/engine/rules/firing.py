@@ -13,7 +13,8 @@ from typing import Any
 
 from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.base.values import own_copy
-from hfg.engine.model.worker import DISABLED, NO_CALLS, SAME_MOMENT_S, UNREADY, Worker
+from hfg.engine.model.rate import SAME_MOMENT_S
+from hfg.engine.model.worker import DISABLED, NO_CALLS, UNREADY, Worker
 from hfg.engine.rules import sharing
 from hfg.engine.rules.agenda import consider, idle_again
 from hfg.engine.rules.calls import call, refuse_coroutine, set_parameter
@@ -115,7 +116,7 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
     modifiers = [token.activity for token in tokens if token.activity]
     kind: Any = "end" if ends else _kind(worker, edges, tokens)
     if core.trace is not None:
-        core.trace(FiringStarted(now, worker.path, worker.firings, kind))
+        core.trace(FiringStarted(now, worker.path, worker.counts.firings, kind))
         for edge, token in zip(edges, tokens, strict=True):
             core.trace(TokenTaken(now, edge.label, token))
     _free_places(worker, edges)
@@ -131,9 +132,9 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
     elif refused is not None:
         if worker.attempts is not None:
             worker.attempts.begin_none()
-        core.upstairs.fail(worker, f"firing {worker.firings}", refused, answer=True)
+        core.upstairs.fail(worker, f"firing {worker.counts.firings}", refused, answer=True)
     elif kind == "silent":
-        worker.fire_silently()
+        worker.counts.add_silent()
         put_outputs(worker, None)
         finish_firing(worker, "silent")
     else:
@@ -152,8 +153,8 @@ def note_start(worker: Worker) -> None:
     """F11, A11: a firing whose function runs begins now."""
     rate_hz = worker.options.max_rate_hz
     if rate_hz:
-        worker.note_start(rate_hz)
-    worker.note_gated_start(worker.core.now())
+        worker.rate.start(worker.core.now(), rate_hz)
+    worker.rate.start_gated(worker.core.now())
     if worker.paced:
         worker.unplace()  # what an input that has ended gave a place to is held by the rate from now on
 
@@ -266,7 +267,7 @@ def _is_held_by_gate(worker: Worker) -> bool:
 
 def _idle_turn(worker: Worker, idle_rate_hz: float | None) -> bool:
     """A11: a throttled node runs its function as often as the idle rate allows."""
-    return idle_rate_hz is not None and worker.core.now() + SAME_MOMENT_S >= worker.gate_next + 1.0 / idle_rate_hz
+    return idle_rate_hz is not None and worker.core.now() + SAME_MOMENT_S >= worker.rate.gate_next + 1.0 / idle_rate_hz
 
 
 def _all_ended(worker: Worker, taking_part: Sequence[Any]) -> bool:
@@ -315,7 +316,7 @@ def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[An
     if worker.attempts is not None:
         worker.attempts.begin(arguments)
     if worker.shape.remembers:
-        worker.remember(values_of(edges, tokens))
+        worker.execution.remember(values_of(edges, tokens))
     if worker.iteration is not None:
         worker.core.upstairs.iterate(worker, arguments)
         return
@@ -323,10 +324,10 @@ def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[An
     call: Any = worker.process
     if kind in ("generator", "async generator"):
         step: Any = next if kind == "generator" else anext
-        if worker.generator is None:
+        if worker.execution.generator is None:
             call = partial(_open, worker, step)
         else:
-            call, arguments = step, (worker.generator,)
+            call, arguments = step, (worker.execution.generator,)
     worker.core.code.execute(worker, call, arguments, when_done(worker))
 
 
@@ -341,7 +342,7 @@ def _open(worker: Worker, step: Callable[[Any], object]) -> object:
             f"it is annotated as an iterator but gave back {type(iterator).__name__}, not one; write `yield` in it, or "
             "`return iter(...)`"
         )
-    worker.keep_generator(iterator)
+    worker.execution.draw_from(iterator)
     return step(iterator)
 
 
@@ -357,7 +358,7 @@ def when_done(worker: Worker) -> Callable[[Any, BaseException | None], None]:
         elif ends_itself(worker, error):
             end_itself(worker)
         else:
-            worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
+            worker.core.upstairs.fail(worker, f"firing {worker.counts.firings}", error, answer=True)
 
     return done
 
@@ -377,13 +378,13 @@ def complete_firing(worker: Worker, result: object) -> None:
                 raise refuse_coroutine(worker, result)
             written = merge(worker, result, worker.written)
         except Exception as error:
-            worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
+            worker.core.upstairs.fail(worker, f"firing {worker.counts.firings}", error, answer=True)
             return
         put_outputs(worker, written)
     if worker.shape.announced:
         announce(worker, written)
     if worker.shape.remembers:
-        worker.recall()
+        worker.execution.recall()
     finish_firing(worker, "done")
 
 
@@ -494,14 +495,14 @@ def entry_of(
 def finish_firing(worker: Worker, outcome: FiringOutcome) -> None:
     """The automatic events follow (A9), then the firing is over and releases what it took (F5)."""
     core = worker.core
-    if worker.limit_timer is not None:
-        worker.in_time()
+    if worker.execution.limit_timer is not None:
+        worker.execution.end_limit()
     if worker.events_due is not None:
         flush_automatic(worker)
     if core.trace is not None:
         if outcome == "done" and worker.blocked & DISABLED:
             outcome = "abandoned"  # disabled meanwhile, with a subgraph around it: its outputs went nowhere (F10)
-        core.trace(FiringEnded(core.now(), worker.path, worker.firings, outcome))
+        core.trace(FiringEnded(core.now(), worker.path, worker.counts.firings, outcome))
     released = worker.end_firing()
     if released:
         release(released)

@@ -25,7 +25,7 @@ def begin(worker: Worker, arguments: Sequence[Any]) -> None:
     try:
         iteration.begin(dict(zip(worker.type.inputs, arguments, strict=True)), worker.options.iterate_over)
     except Exception as error:  # what is no collection raises what it likes
-        worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
+        worker.core.upstairs.fail(worker, f"firing {worker.counts.firings}", error, answer=True)
         return
     worker.core.iterating.append(iteration)
     _go_on(iteration)
@@ -101,7 +101,7 @@ def _fail(iteration: Iteration, occupied: Sequence[Any]) -> None:
     )
     worker.core.iterating.remove(iteration)
     iteration.end()
-    worker.core.upstairs.fail(worker, f"firing {worker.firings}", problem, answer=True)
+    worker.core.upstairs.fail(worker, f"firing {worker.counts.firings}", problem, answer=True)
 
 
 def _collect(reader: Worker) -> None:

@@ -82,7 +82,7 @@ def set_up(worker: Worker, then: Then) -> None:
     if worker.node is None:
         then(None)
         return
-    worker.be_up(True)  # from here on, for `teardown` follows a setup that fails half-way too
+    worker.lifecycle.open()
     try:
         worker.node._reset_states()
         if worker.core.recall is not None:
@@ -90,13 +90,13 @@ def set_up(worker: Worker, then: Then) -> None:
     except Exception as error:  # a default that cannot be copied, a factory that fails
         problem = NodeError(worker.path, "its state", error)
         problem.__cause__ = error
+        worker.lifecycle.opened()
         then(problem)
         return
     worker.core.upstairs.bind_ports(worker)
-    worker.be_opening(True)
 
     def opened(error: NodeError | None) -> None:
-        worker.be_opening(False)
+        worker.lifecycle.opened()
         then(error)
 
     _run_hook(worker, "setup", opened)
@@ -104,7 +104,7 @@ def set_up(worker: Worker, then: Then) -> None:
 
 def tear_down(worker: Worker, then: Then) -> None:
     """Close the node's generator and run its `teardown()`, unless nothing was set up since the last time."""
-    if worker.node is None or not worker.is_up:
+    if worker.node is None or not worker.lifecycle.is_up:
         then(None)
         return
     if worker.flights is not None and worker.is_flying() and not worker.core.over:
@@ -114,9 +114,8 @@ def tear_down(worker: Worker, then: Then) -> None:
     if tasks is not None and tasks.end(lambda: tear_down(worker, then)):
         return  # what its code has started comes to its end first
     of_task = None if tasks is None else tasks.take_problem()
-    worker.be_up(False)
-    generator = worker.generator
-    worker.keep_generator(None)
+    worker.lifecycle.close()
+    generator = worker.execution.close_generator()
 
     def closed(_result: object, error: BaseException | None) -> None:
         problem = of_task
@@ -273,7 +272,7 @@ def _not_ended(worker: Worker) -> None:
     flights, core = worker.flights, worker.core
     if flights is not None and flights.ending is not None and core.trace is not None:
         core.trace(FiringEnded(core.now(), worker.path, flights.end_number, "abandoned"))
-    worker.not_ended()
+    worker.start_over()
 
 
 def reset(worker: Worker, then: Callable[[], None]) -> None:
@@ -302,7 +301,7 @@ def restart(worker: Worker, backoff_s: float) -> None:
         tear_down(worker, lambda _error: then())
 
     def rested() -> None:
-        worker.time_backoff(None)
+        worker.lifecycle.end_rest()
         when_idle(worker, up, nothing)
 
     def up(worker: Worker, then: Callable[[], None]) -> None:
@@ -320,6 +319,6 @@ def restart(worker: Worker, backoff_s: float) -> None:
             then()
 
     def rest() -> None:
-        worker.time_backoff(core.after(backoff_s, rested))
+        worker.lifecycle.rest(core.after(backoff_s, rested))
 
     when_idle(worker, down, rest)

@@ -48,10 +48,6 @@ def set_active(worker: Worker, active: bool, cause: ActivityCause) -> None:
     if active and worker.listened is not None:
         may_listen(worker)
     core = worker.core
-    node = worker.node
-    # under the virtual clock code in a thread sees what was when it began, or chance would say what it sees (R6)
-    if node is not None and (worker.job is None or worker.job.held is None):
-        node._active = active
     tell_activity(worker, cause)
     if not worker.watched:
         return

@@ -115,7 +115,8 @@ def give_up(core: Core) -> bool:
         source.end(given_up=True)
     for source in given_up:
         drain_left([edge for edge in _joined(source) if edge.untaken])  # what it works on is its firing's affair
-        for modifier in source.take_deferred():  # there is no END of its own for which they would wait
+        assert source.ending is not None
+        for modifier in source.ending.take_deferred():  # there is no END of its own for which they would wait
             receive(source, (modifier,))
     derive_scopes(core)
     return bool(given_up)

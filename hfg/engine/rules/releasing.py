@@ -57,7 +57,7 @@ def outputs_free(worker: Worker) -> Sequence[Any]:
         worker.outputs.notify()
     if worker.flights is not None:
         worker.core.upstairs.land(worker)
-    elif worker.pending_end and worker.busy in ("", "edit"):
+    elif worker.ending is not None and worker.ending.pending and worker.busy in ("", "edit"):
         send_end(worker)
     else:
         consider(worker)

@@ -33,10 +33,10 @@ def retry(worker: Worker, error: BaseException) -> bool:
         process: Any = worker.process
         worker.core.code.execute(worker, process, attempts.arguments, firing.when_done(worker))
 
-    if not try_again(worker, attempts, worker.firings, error, again):
+    if not try_again(worker, attempts, worker.counts.firings, error, again):
         return False
     worker.take_written()
-    worker.in_time()
+    worker.execution.end_limit()
     return True
 
 
@@ -54,7 +54,7 @@ def try_again(worker: Worker, attempts: Attempts, number: int, error: BaseExcept
     if not _is_meant(error, options.retry_on) or not attempts.may_go_on(options.retries) or core.over:
         return False
     pause_s = _pause(worker, number, attempts.made)
-    worker.count_retry()
+    worker.counts.add_retry()
     words = in_words(error)
     _LOGGER.warning(
         'node "%s": firing %d, attempt %d of %d, failed: %s; again in %g s',

@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any, Final, TypeAlias
 
 from hfg.engine.model import Core
-from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, CROWDED, ENDED, FIRES_NO_MORE, FULL, Worker
+from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, CROWDED, ENDED, FIRES_NO_MORE, FULL, RATE, Worker
 from hfg.engine.rules.agenda import freed, must_wait
 from hfg.errors import QueueLimit, RunError
 from hfg.graph.flat.order import strongly_connected
@@ -91,7 +91,7 @@ def _take_suspects(core: Core) -> list[Worker]:
         suspects = core.workers if core.all_suspect else list(core.suspects)
     core.all_suspect = False
     core.suspects.clear()
-    return [worker for worker in suspects if worker.full_edges]
+    return [worker for worker in suspects if worker.room.full_edges]
 
 
 def look_at_all(core: Core) -> None:
@@ -99,7 +99,7 @@ def look_at_all(core: Core) -> None:
     if core.full_edges:
         core.waits_changed()
         for worker in core.workers:
-            if worker.full_edges:
+            if worker.room.full_edges:
                 is_held(worker)  # and if a rate does so too, its timer is set
 
 
@@ -108,7 +108,7 @@ def smallest_at_rest(core: Core) -> EventEdge | None:
 
     The ring may lead through other parts, of which we know only that they wait as well.
     """
-    held = [worker for worker in core.workers if worker.full_edges]
+    held = [worker for worker in core.workers if worker.room.full_edges]
     found = _Walk(core, at_rest=True).smallest_of_rings(held) if held else []
     return min(found, key=_size, default=None)
 
@@ -264,7 +264,7 @@ class _Walk:
             if not all([self._will_tell(reason, worker) for reason in self._reasons(worker)]):  # noqa: C419 - each
                 again.append(worker)
             if (worker, _ROOM) not in self._opened:
-                worker.tell_watchers()
+                worker.room.tell_watchers()
         return again
 
     def _reasons(self, held: Worker) -> Iterator[Action]:
@@ -292,10 +292,10 @@ class _Walk:
             return False
         if reason not in self._waits and not _goes_on(leaf, reason[1]):
             region: Any = leaf.region
-            if region is None or not region.head.in_flight:
+            if region is None or not region.head.execution.in_flight:
                 return False
             leaf = region.head  # whose wave is in a thread, or gives way
-        leaf.be_watched_by(held)
+        leaf.room.be_watched_by(held)
         return True
 
     # --- what each action waits for ---------------------------------------------------------------------------------
@@ -356,7 +356,7 @@ def _fire(worker: Worker) -> _Wait | Worker:
 
 def _counts(worker: Worker, waits_for: list[Action]) -> bool:
     """Whether F8 holds its next firing by itself: not beside a rate, a gate or `ready()`, and not beside a call."""
-    if worker.waiting_room:
+    if worker.room.waiting:
         return True
     if worker.blocked & ~(FULL | CROWDED) or worker.busy not in AMID_NOTHING:
         return False
@@ -397,7 +397,7 @@ def _finish(worker: Worker) -> _Wait | Worker:
     if _works(worker):
         return worker
     on = _processing(worker)
-    if worker.waiting_room:
+    if worker.room.waiting:
         on.append((worker, _ROOM))
     return _Wait(on) if on else worker
 
@@ -439,9 +439,9 @@ def _full_edges(worker: Worker) -> list[EventEdge]:
 def _works(worker: Worker) -> bool:
     """Whether a firing or call is under way that does not only wait for room."""
     if worker.flights is None:
-        return worker.busy not in AMID_NOTHING and not worker.waiting_room  # an edit that holds it changes no wait
+        return worker.busy not in AMID_NOTHING and not worker.room.waiting  # an edit that holds it changes no wait
     unfinished = sum(not flight.outcome for flight in worker.flights)
-    return unfinished + (worker.busy not in AMID_NOTHING) > worker.waiting_room
+    return unfinished + (worker.busy not in AMID_NOTHING) > worker.room.waiting
 
 
 def _works_on_firing(worker: Worker) -> bool:
@@ -467,7 +467,7 @@ def is_held(worker: Worker) -> bool:
 
 def _goes_on(worker: Worker, what: str) -> bool:
     """Whether code of it is under way, or the timer of a rate that alone delays this, which say so when over."""
-    if worker.in_flight or (what == _FIRE and worker.rate_timer is not None):
+    if worker.execution.in_flight or (what == _FIRE and worker.blocked & RATE):
         return True
     return worker.flights is not None and worker.flights.working > 0
 
@@ -502,7 +502,7 @@ def _takes_next(worker: Worker, what: str) -> bool:
 
 
 def _has_only_to_have_room(worker: Worker, what: str) -> bool:
-    if worker.busy not in AMID_NOTHING or not worker.full_edges or worker.paced:
+    if worker.busy not in AMID_NOTHING or not worker.room.full_edges or worker.paced:
         return False
     if what == _CALL:
         return worker.blocked < BACKOFF

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 from hfg.activity.rules import asked_for, leaving
 from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.engine.model import Core, RunningEvent
-from hfg.engine.model.worker import AMID_NOTHING, DISABLED, ENDED, Worker
+from hfg.engine.model.worker import AMID_NOTHING, DISABLED, ENDED, RATE, Worker
 from hfg.engine.rules.agenda import add_call, arrived, let_follow, note_full
 from hfg.engine.rules.listening import listens, may_listen
 from hfg.engine.rules.modifiers import (
@@ -91,7 +91,7 @@ def put_value(worker: Worker, value: object) -> None:
         stamp = core.now()
     for edge in shape.outgoing:
         put(edge, value, 0, stamp)
-    if worker.outputs.missing and (worker.placed or worker.rate_timer is not None):
+    if worker.outputs.missing and (worker.placed or worker.blocked & RATE):
         worker.unplace()
     if len(core.followers) > since:
         let_follow(core, since)
@@ -121,7 +121,7 @@ def _put_outputs(worker: Worker, written: Written) -> None:
     for edge, value, modifier, stamp in _tokens(worker, written):
         carried = carried or modifier == 1
         put(edge, value, modifier, stamp)
-    if worker.outputs.missing and (worker.placed or worker.rate_timer is not None):
+    if worker.outputs.missing and (worker.placed or worker.blocked & RATE):
         worker.unplace()
     if carried:
         _activity_left(worker)
@@ -156,7 +156,6 @@ def _activity_left(worker: Worker) -> None:
         return  # what it gave was none of its own (A4), or left before (A3)
     if worker.scope is not None:  # by its events it leaves everything inside (G2)
         worker.become(False)
-        worker.node._active = False
         worker.core.upstairs.deactivate_inside(worker.scope, "sent")
     else:
         worker.keep_right(worker.stamp is not None)  # in a firing or call
@@ -224,8 +223,8 @@ def _drain(edge: AnyEdge, lying: Lying) -> None:
     if core.trace is not None:
         core.trace(TokenDrained(core.now(), edge.label, Token(*lying)))
     if modifier:
-        if target.deferred is not None and not into_slot:
-            target.defer(modifier)
+        if not into_slot and target.ending is not None and target.ending.deferred is not None:
+            target.ending.defer(modifier)
             if target.scopes:
                 touch(core, target.scopes)
         else:
@@ -272,7 +271,8 @@ def send_end(worker: Worker) -> None:
     core = worker.core
     end = (END, None, None)
     with telling_behind(core):
-        worker.send_end_now()
+        assert worker.ending is not None
+        worker.send_as(worker.ending.send())
         since = len(core.followers)
         _put_outputs(worker, [end] * len(worker.out_edges))
         let_follow(core, since)
@@ -280,7 +280,7 @@ def send_end(worker: Worker) -> None:
         _sent(core)
         if core.seldom is not None:
             core.seldom(NodeEnded(core.now(), worker.path))
-        deferred = worker.take_deferred()
+        deferred = worker.ending.take_deferred()
         for modifier in deferred:
             receive(worker, (modifier,))
         if deferred and worker.scopes:

@@ -63,4 +63,4 @@ def _still_comes(sender: Worker, resting: Collection[Worker]) -> bool:
 
 def _is_over(worker: Worker) -> bool:
     """Whether it has said END, too."""
-    return bool(worker.blocked & ENDED) and worker.deferred is None
+    return bool(worker.blocked & ENDED) and (worker.ending is None or worker.ending.deferred is None)

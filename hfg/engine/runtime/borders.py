@@ -186,7 +186,7 @@ class Outlet:
             enable_around(worker)
         elif before == "over" and self._drains:
             worker.allow(ENDED)
-            worker.not_ended()
+            worker.start_over()
             enable_around(worker)
         if hearing == "deaf":
             self._waiting = 0
@@ -194,8 +194,9 @@ class Outlet:
         elif hearing == "over" and self._drains:
             self._waiting = 0
             worker.end()
+            assert worker.ending is not None
             drain_left(worker.in_edges)
-            worker.take_deferred()
+            worker.ending.take_deferred()
             node_ended(worker)
         self._engine.kick()
 

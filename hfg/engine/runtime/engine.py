@@ -496,7 +496,7 @@ class Engine:
         self._instant_steps += _VIRTUAL_SLICE_WAVES
         if self._instant_steps > _MOST_AT_ONE_INSTANT and self.settings.until_s is not None:
             self.core.settle_counts()
-            busiest = max(self.core.workers, key=lambda worker: worker.firings + worker.call_number)
+            busiest = max(self.core.workers, key=lambda worker: worker.counts.done)
             self.finish(
                 "failed",
                 RunError(

@@ -142,7 +142,7 @@ class Lifetime:
     def carry(self, worker: Worker) -> None:
         """Give an async node its dormant task."""
         if worker.may_wait():
-            worker.be_carried(self._engine.code.carrier(worker))
+            worker.execution.run_in(self._engine.code.carrier(worker))
 
     async def _set_up_one(self, worker: Worker) -> None:
         engine = self._engine
@@ -278,7 +278,7 @@ class Lifetime:
 
     def _carriers(self) -> list[Any]:
         engine = self._engine
-        carriers = [worker.carrier for worker in engine.core.workers if worker.carrier is not None]
+        carriers = [worker.execution.carrier for worker in engine.core.workers if worker.execution.carrier is not None]
         for worker in engine.core.workers:
             if worker.flights is not None:
                 carriers += worker.flights.carriers()
@@ -343,11 +343,11 @@ class Lifetime:
     async def _cancel_code(self) -> dict[Worker, NodeError]:
         """Cancel what still waits; threads get their time to come back. Gives back who did not."""
         code = self._engine.code
-        busy = [worker for worker in self._engine.core.workers if worker.in_flight]
+        busy = [worker for worker in self._engine.core.workers if worker.execution.in_flight]
         for worker in busy:
             worker.give_up_firing()
-            if worker.carrier is not None:
-                worker.carrier.cancel()
+            if worker.execution.carrier is not None:
+                worker.execution.carrier.cancel()
         flights = [flight for worker in self._engine.core.workers for flight in worker.flights or ()]
         for flight in flights:
             flight.in_time()
@@ -360,12 +360,14 @@ class Lifetime:
         begun = time.monotonic()
         if busy or flights or tasks.under_way:
             await self._until_back(
-                lambda: bool(tasks.under_way) or any(worker.in_flight for worker in busy) or _any_works(flights)
+                lambda: (
+                    bool(tasks.under_way) or any(worker.execution.in_flight for worker in busy) or _any_works(flights)
+                )
             )
         seconds = time.monotonic() - begun
         self._of_tasks = tasks.leave_behind(seconds)
         late = [flight for flight in flights if flight.working]
-        return self._leave_behind([worker for worker in busy if worker.in_flight], late, seconds)
+        return self._leave_behind([worker for worker in busy if worker.execution.in_flight], late, seconds)
 
     def _leave_behind(self, busy: list[Worker], late: list[Flight], seconds: float) -> dict[Worker, NodeError]:
         """Wait no more for what does not come back; others of its thread group have their teardown in a new thread."""
@@ -383,9 +385,9 @@ class Lifetime:
 
     async def _tear_down_one(self, worker: Worker) -> NodeError | None:
         engine = self._engine
-        if worker.node is None or not worker.is_up:
+        if worker.node is None or not worker.lifecycle.is_up:
             return None
-        if worker.generator is None and worker.node._hook("teardown") is None:
+        if worker.execution.generator is None and worker.node._hook("teardown") is None:
             return None
         waiter: asyncio.Future[NodeError | None] = engine.loop.create_future()
         try:
@@ -428,8 +430,8 @@ def _any_works(flights: Sequence[Flight]) -> bool:
 
 def _doing(worker: Worker) -> str:
     if worker.call_edge is not None:
-        return f"slot {worker.call_edge.port_name}, call {worker.call_number}"
-    return f"firing {worker.firings}"
+        return f"slot {worker.call_edge.port_name}, call {worker.counts.calls}"
+    return f"firing {worker.counts.firings}"
 
 
 def _did_not_end(worker: Worker, seconds: float) -> str:

@@ -168,7 +168,7 @@ def release_ports(worker: Worker) -> None:
     """The run is over: what the ports led to is gone, their subscribers are told."""
     node = worker.node
     if node is not None:
-        node._active = False
+        worker.hide_activity()
         node._start_task = None
     for event in worker.events.values():
         port = event.port

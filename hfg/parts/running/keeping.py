@@ -231,7 +231,7 @@ class Keeper:
         core.settle_counts()
         workers = core.workers
         return (
-            sum(worker.firings + worker.call_number for worker in workers),
+            sum(worker.counts.done for worker in workers),
             [worker.path for worker in workers if worker.blocked & ENDED],
             [worker.path for worker in workers if worker.pending_end],
             [outlet.left for outlet in self._outlets.values()],  # not `sent`, which may go back when a neighbour joins
@@ -385,10 +385,11 @@ class Keeper:
         for path, is_pending in kept.ended.items():
             worker = self._engine.core.by_path[path]
             worker.end()
+            assert worker.ending is not None
             if is_pending:
                 worker.promise_end(None)
             else:
-                worker.take_deferred()
+                worker.ending.take_deferred()
             drain_left(worker.in_edges)
 
     def _lay_again(self, edge: AnyEdge, found: KeptEdge) -> None:

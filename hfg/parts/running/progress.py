@@ -81,7 +81,7 @@ class Progress:
     def count_anew(self, core: Core, inlets: Mapping[str, Inlet], outlets: Mapping[str, Outlet]) -> None:
         """An edit has changed nodes and edges, and nothing that came in is still there."""
         self.look_for_last(core)
-        self._before = {worker: worker.firings for worker in self._last}
+        self._before = {worker: worker.counts.firings for worker in self._last}
         self._before |= {outlets[label]: outlets[label].finished for label in self.leaving}
         self._origin = {label: inlets[label].taken for label in self.coming}
 
@@ -109,7 +109,7 @@ class Progress:
         if self._last:
             core.settle_counts()
             ends += [
-                worker.firings - before.get(worker, 0) - (worker.busy == "firing")
+                worker.counts.firings - before.get(worker, 0) - (worker.busy == "firing")
                 for worker in self._last
                 if worker.busy or not worker.blocked & ENDED
             ]
