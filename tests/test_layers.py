@@ -254,7 +254,7 @@ def fields_of(module: str, name: str) -> set[str]:
     raise AssertionError(f"{module} has no class {name}")
 
 
-WORKERS_FIELDS = fields_of("hfg.engine.model.worker", "Worker") - {"path", "index"}
+WORKERS_FIELDS = fields_of("hfg.engine.model.running_node", "RunningNode") - {"path", "index"}
 """(Many things have a path or an index.)"""
 EDGES_FIELDS = {"token", "held", "sent", "dropped", "drained", "ended", "live", "working", "deepest", "full", "grown"}
 
@@ -269,7 +269,7 @@ def test_fast_paths_change_nodes_by_the_names_of_their_transitions() -> None:
             if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store | ast.Del):
                 is_nodes = isinstance(one.value, ast.Name) and one.value.id not in ("self", "core", "edge")
                 assert not (is_nodes and one.attr in WORKERS_FIELDS), (
-                    f"{module}:{one.lineno} writes {ast.unparse(one)}: give `Worker` a transition"
+                    f"{module}:{one.lineno} writes {ast.unparse(one)}: give `RunningNode` a transition"
                 )
 
 

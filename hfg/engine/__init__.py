@@ -13,7 +13,7 @@ side by side and know nothing of each other:
     face        what users hold in their hands: a run, its feeds and readers; composes all the others
 
 What has to go the other way is called by a table that is declared below and filled from above: `core.Host` and
-`core.Code` (deciding needs somebody who waits), `core.Upstairs` (a rule that ends in another one further up), and
+`core.Code` (deciding needs somebody who waits), `core.RuleCallbacks` (a rule that ends in another one further up), and
 `callbacks.Callbacks` (who stands on an engine wants to be told).
 """
 

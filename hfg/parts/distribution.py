@@ -65,9 +65,9 @@ from hfg.parts.model.messages import (
 from hfg.parts.model.sieve import sieve
 from hfg.parts.processes.other import Launcher, Other
 from hfg.parts.processes.worker import FIRST_LIFE
-from hfg.parts.running.carrier import Carrier
 from hfg.parts.running.channels import Channel, name_of
 from hfg.parts.running.part import Part
+from hfg.parts.running.part_links import PartLinks
 from hfg.parts.running.rings import sweep_run, sweep_runs
 from hfg.parts.steering.asking import Asking
 from hfg.parts.steering.editing import Drawing
@@ -132,7 +132,7 @@ class Distribution:
         self._run_of_all: Run
         self._part: Part
         self._standing: Standing | None = None
-        self._carrier: Carrier | None = None
+        self._carrier: PartLinks | None = None
         self._is_open = False
         self._has_begun = False
         self._ledgers: dict[str, Ledger] = {}
@@ -188,7 +188,7 @@ class Distribution:
             sweep_runs()
         for other in self._others.values():
             other.begin(self._channel_to(other))
-        self._carrier = Carrier(
+        self._carrier = PartLinks(
             self._part,
             session,
             self._launcher.near or session,

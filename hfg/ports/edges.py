@@ -56,10 +56,10 @@ class Edge:
 
     __slots__ = (
         "active",
+        "depth_first",
         "drained",
         "dropped",
         "ended",
-        "follows",
         "handler",
         "index",
         "label",
@@ -100,7 +100,7 @@ class Edge:
         self.lost = 0
         self.live = True
         self.sequential = False
-        self.follows = False
+        self.depth_first = False
         self.ended = False
         self.via: tuple[Any, ...] = ()
         self.segments: tuple[Any, ...] = ()
@@ -135,10 +135,10 @@ class Edge:
         self.target_port = target_port
         self.via = via
 
-    def be_released(self, *, sequential: bool, follows: bool) -> None:
+    def be_released(self, *, sequential: bool, depth_first: bool) -> None:
         """Set when its tokens are processed: it depends on the consumer's mode and the groups of both ends (F5, R2)."""
         self.sequential = sequential
-        self.follows = follows
+        self.depth_first = depth_first
 
     def go_on(self, sent: int, *, ended: bool) -> None:
         """Take the place of an edge that has transported `sent` tokens; `ended` if the last of them was END."""
@@ -209,15 +209,15 @@ class SyncEdge(Edge):
 
     Attributes:
       token: the untaken token, or None.
-      held: the producer's place is occupied: from sending until the token counts as processed (F5).
+      unprocessed: the producer's place is occupied: from sending until the token counts as processed (F5).
     """
 
-    __slots__ = ("held", "token")
+    __slots__ = ("token", "unprocessed")
 
     def __init__(self, index: float, label: str, active: bool) -> None:
         super().__init__(index, label, active)
         self.token: Token[Any] | None = None
-        self.held = False
+        self.unprocessed = False
         self.sequential = True
 
     def put(self, token: Token[Any]) -> bool:
@@ -226,10 +226,10 @@ class SyncEdge(Edge):
         Raises:
           EngineInternalError: the place is occupied.
         """
-        if self.token is not None or self.held:
+        if self.token is not None or self.unprocessed:
             raise EngineInternalError(f'a second token on synchronous edge "{self.label}"')
         self.token = token
-        self.held = True
+        self.unprocessed = True
         return True
 
     def take(self) -> Token[Any]:
@@ -240,8 +240,8 @@ class SyncEdge(Edge):
 
     def release(self) -> bool:
         """Mark the token as processed. Return whether its producer was waiting for it."""
-        held, self.held = self.held, False
-        return held
+        unprocessed, self.unprocessed = self.unprocessed, False
+        return unprocessed
 
     def strip(self, changed: Callable[[Token[Any]], Token[Any]]) -> None:
         """Replace the modifier of the token on the edge."""
@@ -268,7 +268,7 @@ class SyncEdge(Edge):
         return [] if self.token is None else [self.token]
 
     def _relations(self) -> Iterator[tuple[bool, str]]:
-        yield self.token is None or self.held, "a token on it counts as processed (F5)"
+        yield self.token is None or self.unprocessed, "a token on it counts as processed (F5)"
 
 
 class _QueueEdge(Edge):
@@ -332,16 +332,16 @@ class BufferEdge(_QueueEdge):
       queue: untaken tokens.
       room: how many tokens may be here while the producer continues: the places of the buffer plus the initial tokens.
       working: only for a sequential edge: the consumer has taken a token that is not processed yet.
-      held: the producer's newest token counts as unprocessed because there is no room for it.
+      unprocessed: the producer's newest token counts as unprocessed because there is no room for it.
     """
 
-    __slots__ = ("held", "room", "working")
+    __slots__ = ("room", "unprocessed", "working")
 
     def __init__(self, index: float, label: str, active: bool, initial: tuple[Any, ...], buffer: int) -> None:
         super().__init__(index, label, active, initial)
         self.room = len(initial) + buffer
         self.working = False
-        self.held = False
+        self.unprocessed = False
 
     def put(self, token: Token[Any]) -> bool:
         """Put a token at the end of the queue. Return whether the producer has to wait (P4, P7).
@@ -349,11 +349,11 @@ class BufferEdge(_QueueEdge):
         Raises:
           EngineInternalError: the producer is already waiting.
         """
-        if self.held:
+        if self.unprocessed:
             raise EngineInternalError(f'one token too many on synchronous edge "{self.label}"')
         self.lay((token.value, token.activity, token.stamp, token.sequence))
-        self.held = self.crowded
-        return self.held
+        self.unprocessed = self.crowded
+        return self.unprocessed
 
     def take(self) -> Token[Any]:
         """Take the oldest token. On a sequential edge, its place stays occupied until `release` (F5)."""
@@ -363,9 +363,9 @@ class BufferEdge(_QueueEdge):
     def release(self) -> bool:
         """Mark the taken token as processed. Return whether its producer was waiting for it and continues now."""
         self.working = False
-        if not self.held or self.crowded:
+        if not self.unprocessed or self.crowded:
             return False
-        self.held = False
+        self.unprocessed = False
         return True
 
     def go_on_working(self, working: bool) -> None:
@@ -385,7 +385,7 @@ class BufferEdge(_QueueEdge):
     def _relations(self) -> Iterator[tuple[bool, str]]:
         yield len(self.queue) + self.working <= self.capacity, f"it holds more than {self.capacity} tokens (P4, P7)"
         yield (
-            self.held == self.crowded or not self.live,
+            self.unprocessed == self.crowded or not self.live,
             "its producer waits although there is room, or does not wait although there is none",
         )
         yield self.sequential or not self.working, "tokens of a pipelined edge are processed when they are taken (F5)"

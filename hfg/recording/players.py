@@ -15,7 +15,7 @@ import msgspec
 
 from hfg.base.logs import Log
 from hfg.base.token import NO_MESSAGE
-from hfg.engine.model.worker import UNREADY
+from hfg.engine.model.running_node import UNREADY
 from hfg.engine.rules.agenda import unblock
 from hfg.errors import EndOfStream, HfgError, UsageError
 from hfg.graph.structure.level import level_of

@@ -13,7 +13,7 @@ import msgspec
 
 from hfg.base.logs import Log
 from hfg.engine import Run
-from hfg.engine.model.worker import DISABLED
+from hfg.engine.model.running_node import DISABLED
 from hfg.engine.observing.recorder import Place, Recorder
 from hfg.errors import GraphError, UsageError
 from hfg.graph import commands

@@ -41,9 +41,9 @@ from hfg.parts.model.messages import (
     unpack,
 )
 from hfg.parts.model.sieve import sieve
-from hfg.parts.running.carrier import Carrier
 from hfg.parts.running.channels import Channel, name_of
 from hfg.parts.running.part import Part
+from hfg.parts.running.part_links import PartLinks
 from hfg.trace import NodeEnded, TokenProcessed, TokenSent, TokenTaken, TraceEvent
 from hfg.transport import Traffic
 from hfg_transports.memory import Network
@@ -140,7 +140,7 @@ def test_what_is_said_of_an_edge_that_is_not_there_is_refused_and_changes_nothin
         said: list[Any] = []
         part = Part(MAIN, Composition(cutting.parts[MAIN], Settings()), edges, rests=said.append)
         session = await Network().open()
-        carrier = Carrier(
+        carrier = PartLinks(
             part, session, session, RUN, dict.fromkeys(cutting.parts, 1), edges, lambda *told: said.append(told)
         )
         for other in cutting.parts:
@@ -166,7 +166,7 @@ def test_a_gap_in_the_numbers_of_an_edge_that_may_lose_is_counted_however_large_
         edges = list(cutting.edges_of(MAIN))
         part = Part(MAIN, Composition(cutting.parts[MAIN], Settings()), edges, rests=lambda _: None)
         here, there = await (network := Network()).open(), await network.open()
-        carrier = Carrier(part, here, here, RUN, dict.fromkeys(cutting.parts, 1), edges, lambda *_: None)
+        carrier = PartLinks(part, here, here, RUN, dict.fromkeys(cutting.parts, 1), edges, lambda *_: None)
         publisher = there.publisher(f"{RUN}/edge/{edges[0].number}/tokens", Traffic.BULK)
         publisher.put(write(Tokens(1, 1, 2**61, 1, [b""])), b"")
         await asyncio.sleep(0.01)

@@ -12,7 +12,7 @@ import pytest
 
 import hfg
 from hfg.engine.fusion.region import Region
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.engine.runtime import settings
 from tests.semantics.nodes import Keep, drive, forward, numbers, scale
 
@@ -81,13 +81,13 @@ def test_a_wave_that_begins_with_a_flag_up_ends_behind_its_first_call(
     def meddle(region: Region) -> None:
         head, flags, step = region.head, region.flags, region.head.step
 
-        def begin(worker: Worker) -> None:
+        def begin(worker: RunningNode) -> None:
             flags.forget = lambda: None  # as if another wave had been entered last
             flags.append("slice")
-            head.go_by(step)
+            head.use_step(step)
             step(worker)
 
-        head.go_by(begin)
+        head.use_step(begin)
 
     assert _amid_a_call(meddle, None) == list(range(2, 42, 2))
     assert left[0] == ("numbers", 8)

@@ -261,15 +261,15 @@ class _Waiting:
     class options:  # noqa: N801
         deadline_s = 1.0
 
-    def __init__(self, *, placed: bool, ahead: int = 0, calls: Any = None, live_inputs: Any = ()) -> None:
-        self.placed, self.ahead, self.calls, self.live_inputs = placed, ahead, calls, live_inputs
+    def __init__(self, *, fireable: bool, calls_before: int = 0, calls: Any = None, live_inputs: Any = ()) -> None:
+        self.fireable, self.calls_before, self.calls, self.live_inputs = fireable, calls_before, calls, live_inputs
 
 
 @pytest.mark.rule("R2", "F9")
 def test_the_deadline_is_that_of_what_comes_next_the_call_or_the_firing() -> None:
-    call = _Waiting(placed=True, ahead=1, calls=[_Edge(5.0, 1.0)], live_inputs=[_Edge(3.0)])
-    firing = _Waiting(placed=True, live_inputs=[_Edge(4.0), _Edge(9.0)])
-    source = _Waiting(placed=True)
+    call = _Waiting(fireable=True, calls_before=1, calls=[_Edge(5.0, 1.0)], live_inputs=[_Edge(3.0)])
+    firing = _Waiting(fireable=True, live_inputs=[_Edge(4.0), _Edge(9.0)])
+    source = _Waiting(fireable=True)
     policy: Any = EarliestDeadline()
     for worker in (source, call, firing):
         policy.push(worker)

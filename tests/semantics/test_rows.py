@@ -146,13 +146,13 @@ def drawn(seed: int) -> tuple[hfg.Graph, Seen]:
 def rows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many turns each row of calls has had beyond its first."""
     found: list[int] = []
-    had_turns = Group.had_turns
+    spend = Group.spend
 
     def noted(group: Group[Any], more: int) -> None:
         found.append(more)
-        had_turns(group, more)
+        spend(group, more)
 
-    monkeypatch.setattr(Group, "had_turns", noted)
+    monkeypatch.setattr(Group, "spend", noted)
     return found
 
 

@@ -10,7 +10,7 @@ import pytest
 import reactivex.operators as ops
 
 import hfg
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.testing import recorder, reference_run, replay
 from hfg.trace import EventTriggered, TokenSent
 from tests.semantics.nodes import (
@@ -255,7 +255,7 @@ def test_operators_sit_on_it_as_on_any_event(fast: bool) -> None:
 
 
 def test_nothing_is_made_and_nothing_is_paid_for_while_nobody_asks() -> None:
-    def worker(run: hfg.Run, path: str) -> Worker:
+    def worker(run: hfg.Run, path: str) -> RunningNode:
         return run._engine.core.by_path[path]
 
     async def main() -> list[int]:

@@ -14,15 +14,15 @@ from hfg.engine.editing.plan_diff import PlanDiff
 from hfg.engine.editing.plan_index import PlanIndex
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model import Core, Gate, Group, Scope
-from hfg.engine.model.worker import DISABLED, ENDED, RATE, REMOVED, RESTING, STARTING, Worker
-from hfg.engine.rules import lifecycle, wiring
+from hfg.engine.model.running_node import DISABLED, ENDED, RATE, REMOVED, RESTING, STARTING, RunningNode
+from hfg.engine.rules import node_lifecycle, wiring
 from hfg.engine.rules.activity import rest
 from hfg.engine.rules.agenda import note_full
 from hfg.engine.rules.ending import drain_left
 from hfg.engine.rules.modifiers import discard, touch
 from hfg.engine.rules.releasing import release
-from hfg.engine.rules.sending import flush_automatic, telling_behind
-from hfg.engine.rules.sources import judge_sources
+from hfg.engine.rules.sending import deferring_events, send_automatic
+from hfg.engine.rules.sources import find_dead_sources
 from hfg.engine.runtime import plan, ports
 from hfg.graph import Graph
 from hfg.graph.flat import End, FlatEdge
@@ -39,7 +39,7 @@ __all__ = ["apply"]
 
 
 def apply(
-    core: Core, index: PlanIndex, graph: Graph, found: PlanDiff, come: list[Worker], groups: Mapping[str, Group]
+    core: Core, index: PlanIndex, graph: Graph, found: PlanDiff, come: list[RunningNode], groups: Mapping[str, Group]
 ) -> tuple[list[tuple[Any, FlatEdge]], set[Any]]:
     """Do it.
 
@@ -71,7 +71,7 @@ class _Ends(plan.Ends):
         super().__init__(core, loop)
         self._index = index
 
-    def of(self, end: End) -> Worker:
+    def of(self, end: End) -> RunningNode:
         worker = self._index.by_node.get(getattr(end.port, "node", None))
         if worker is None or isinstance(end.port, InnerSource | InnerTarget):
             return self.at_border(end, None if worker is None else worker.iteration)
@@ -94,7 +94,7 @@ class _Applying:
         index: PlanIndex,
         graph: Graph,
         found: PlanDiff,
-        come: list[Worker],
+        come: list[RunningNode],
         groups: Mapping[str, Group],
     ) -> None:
         self.core = core
@@ -103,8 +103,8 @@ class _Applying:
         self.found = found
         self.come = come
         self.groups = groups
-        self.touched: dict[Worker, None] = {}  # whose wiring is to be derived anew
-        self.elsewhere: dict[Worker, None] = {}  # who lies in other subgraphs than before
+        self.touched: dict[RunningNode, None] = {}  # whose wiring is to be derived anew
+        self.elsewhere: dict[RunningNode, None] = {}  # who lies in other subgraphs than before
         self.refitted = {worker for worker, _, _ in found.swapped}
         self.scopes: dict[Scope, None] = {}  # in which something is not as it was
         self.named: list[Any] = []  # edges that are called otherwise now
@@ -194,7 +194,7 @@ class _Applying:
             if core.by_path.get(worker.path) is worker:
                 del core.by_path[worker.path]
 
-    def _take_out(self, worker: Worker) -> None:
+    def _take_out(self, worker: RunningNode) -> None:
         core, index = self.core, self.index
         label = index.leaves.label
         for scope in worker.around:
@@ -205,7 +205,7 @@ class _Applying:
         if worker.within is not None:
             worker.within.leave(worker)
 
-    def _put_in(self, worker: Worker) -> None:
+    def _put_in(self, worker: RunningNode) -> None:
         core, index = self.core, self.index
         place = node_place(worker.node)
         position = bisect_left(index.leaves.items, place, key=lambda one: node_place(one.node))
@@ -222,7 +222,7 @@ class _Applying:
         self._join(worker)
         self.elsewhere[worker] = None
 
-    def _join(self, worker: Worker) -> None:
+    def _join(self, worker: RunningNode) -> None:
         """It is inside of what iterates, if anything around it does (G4)."""
         level: Level | None = level_of(worker.node._place.graph)
         while level is not None and level.owner is not None:
@@ -232,7 +232,7 @@ class _Applying:
                 return
             level = level.around
 
-    def _list_source(self, worker: Worker, is_one: bool) -> None:
+    def _list_source(self, worker: RunningNode, is_one: bool) -> None:
         """Let a worker be in the list of sources, or not."""
         sources, label = self.core.sources, self.index.leaves.label
         position = bisect_left(sources, label(worker), key=label)
@@ -251,7 +251,7 @@ class _Applying:
         owner = level_of(node._place.graph).owner
         return None if owner is None else self.index.by_node[owner].scope
 
-    def _take_out_scope(self, worker: Worker) -> None:
+    def _take_out_scope(self, worker: RunningNode) -> None:
         core, index, scope = self.core, self.index, worker.scope
         assert scope is not None
         if scope.parent is not None:
@@ -262,7 +262,7 @@ class _Applying:
         if worker.within is not None:
             worker.within.leave(worker)
 
-    def _put_in_scope(self, box: Any, worker: Worker | None) -> None:
+    def _put_in_scope(self, box: Any, worker: RunningNode | None) -> None:
         core, index = self.core, self.index
         parent = self._scope_around(box)
         if worker is None:
@@ -291,13 +291,13 @@ class _Applying:
         self.scopes[scope] = None
         self.elsewhere[worker] = None
 
-    def _rename(self, worker: Worker) -> None:
+    def _rename(self, worker: RunningNode) -> None:
         """It has another path, and so has all inside it."""
         self.core.by_path[worker.path] = worker
         if worker.scope is not None:
             worker.scope.rename(worker.path)
 
-    def _regroup(self, worker: Worker, options: Any) -> None:
+    def _regroup(self, worker: RunningNode, options: Any) -> None:
         """It may run elsewhere from now on."""
         worker.set_options(options)
         group = self.groups[options.group or "loop"]
@@ -386,11 +386,11 @@ class _Applying:
             return
         before = edge.sequential
         plan.derive_release(edge)
-        target: Worker = edge.target
+        target: RunningNode = edge.target
         if not before or edge.sequential:
             return
         # what it has taken is processed by that (F5)
-        if edge in target.taken and (target.held or target.busy in ("firing", "ending")):
+        if edge in target.taken and (target.holds_inputs or target.busy in ("firing", "ending")):
             release(target.release_early((edge,)))
         elif edge is target.call_edge and edge.token is None:
             release((edge,))
@@ -462,8 +462,8 @@ class _Applying:
             worker.rate.start_gated(float("-inf"))  # an idle rate counts from the first firing behind the gate
             gated[worker] = None
         self.touched |= gated
-        self.scopes |= {state: None for state in states if not isinstance(state, Worker)}
-        self.touched |= {state: None for state in states if isinstance(state, Worker)}
+        self.scopes |= {state: None for state in states if not isinstance(state, RunningNode)}
+        self.touched |= {state: None for state in states if isinstance(state, RunningNode)}
 
     def _watch(self) -> None:
         """Whose activity somebody cares about, now that nodes are elsewhere, and edges lead from other ports (G2)."""
@@ -490,13 +490,13 @@ class _Applying:
         self._derive_live()
         touched = [worker for worker in self.touched if not worker.blocked & REMOVED]
         self._derive_anew(touched)
-        with telling_behind(self.core):
+        with deferring_events(self.core):
             self._let_go()
         for worker in touched:
             if not worker.busy:
-                flush_automatic(worker)
-        lifecycle.disable_around(worker for worker in touched if any(not scope.enabled for scope in worker.around))
-        judge_sources(self.core)
+                send_automatic(worker)
+        node_lifecycle.disable_around(worker for worker in touched if any(not scope.enabled for scope in worker.around))
+        find_dead_sources(self.core)
         self.core.waits_changed()
 
     def _begin(self, edge: Any) -> None:
@@ -506,7 +506,7 @@ class _Applying:
             edge.begin(self.core.now())
             if isinstance(edge, EventEdge):
                 note_full(edge)
-            lifecycle.discard_initial((edge,))
+            node_lifecycle.discard_initial((edge,))
             if edge.target.blocked & ENDED:
                 drain_left((edge,))
 
@@ -521,7 +521,7 @@ class _Applying:
                 edge.enliven(live)
                 self._touch_ends(edge)
 
-    def _derive_anew(self, touched: list[Worker]) -> None:
+    def _derive_anew(self, touched: list[RunningNode]) -> None:
         """What they wait for, what they send on, and what somebody wants to know of them."""
         for worker in touched:
             self._bind(worker)
@@ -543,8 +543,8 @@ class _Applying:
         for worker in self.found.gone:
             if worker.active and worker.scope is None:
                 core.lost_activity += 1
-                if core.seldom is not None:
-                    core.seldom(ActivityLost(core.now(), worker.path))
+                if core.trace_changes is not None:
+                    core.trace_changes(ActivityLost(core.now(), worker.path))
         touch(core, [scope for scope in self.scopes if scope.watched])
 
     def changed_nodes(self) -> set[Any]:
@@ -557,7 +557,7 @@ class _Applying:
                 nodes |= {getattr(segment.source, "node", None), segment.target.node}
         return nodes
 
-    def _bind(self, worker: Worker) -> None:
+    def _bind(self, worker: RunningNode) -> None:
         """Let the events of a worker know where they lead now; one that leads nowhere and is automatic is none."""
         for name, event in list(worker.events.items()):
             watched = event.port is not None and event.port._observers
@@ -566,7 +566,7 @@ class _Applying:
             elif worker.node is not None:
                 ports.bind_event(worker, name)
         if worker.node is not None and worker.scope is None:
-            self.core.upstairs.bind_ports(worker)
+            self.core.rules.bind_ports(worker)
         specialise(worker)
 
 

@@ -18,20 +18,20 @@ import msgspec
 
 from hfg.base.values import same
 from hfg.engine.editing.applying import apply
-from hfg.engine.editing.holding import Held
+from hfg.engine.editing.edit_lock import EditLock
 from hfg.engine.editing.plan_diff import PlanDiff, diff
 from hfg.engine.editing.plan_index import PlanIndex
+from hfg.engine.editing.quiesce import Quiesced
 from hfg.engine.editing.setting import refuse_without_effect
-from hfg.engine.editing.turns import Turns
 from hfg.engine.executing.code import answer, whose_code
 from hfg.engine.model import Scope
-from hfg.engine.model.worker import BACKOFF, DISABLED, ENDED, UNREADY, Worker
-from hfg.engine.rules import concurrency, doing, lifecycle, subgraphs
+from hfg.engine.model.running_node import BACKOFF, DISABLED, ENDED, UNREADY, RunningNode
+from hfg.engine.rules import concurrency, doing, node_lifecycle, subgraphs
 from hfg.engine.runtime import plan
 from hfg.engine.runtime import ports as engine_ports
 from hfg.engine.runtime.callbacks import Edited
 from hfg.engine.runtime.engine import Engine
-from hfg.engine.runtime.lifetime import Lifetime
+from hfg.engine.runtime.run_lifecycle import RunLifecycle
 from hfg.errors import GraphError, HfgError, NodeError, NotRunning
 from hfg.graph import Graph
 from hfg.graph.checks import check_flat
@@ -56,7 +56,7 @@ from hfg.trace import ParameterSet, StructureChanged
 
 __all__ = ["Edits"]
 
-_Switched = dict[Worker, bool]
+_Switched = dict[RunningNode, bool]
 """Nodes and subgraphs, and whether they are enabled or disabled."""
 
 
@@ -79,7 +79,7 @@ class _Following:
         self.switched: _Switched = {}
         self.values: list[ParameterChange] = []
         self.copied: list[tuple[NodeCopied, dict[str, Any]]] = []
-        self.come: list[Worker] = []
+        self.come: list[RunningNode] = []
         self.took_effect = False
 
 
@@ -90,12 +90,12 @@ class Edits:
       turns: whoever calls one of `edit_now`, `undo_now` and `redo_now` has a turn, and calls `leave` behind it.
     """
 
-    def __init__(self, engine: Engine, lifetime: Lifetime) -> None:
+    def __init__(self, engine: Engine, run_lifecycle: RunLifecycle) -> None:
         self._engine = engine
-        self._lifetime = lifetime
+        self._lifecycle = run_lifecycle
         self._graph: Graph = engine.graph
         self._index: PlanIndex | None = None  # from the first edit on
-        self.turns = Turns()
+        self.lock = EditLock()
 
     async def edit(self, commands: Sequence[Command]) -> None:
         """See `Run.edit`."""
@@ -105,17 +105,17 @@ class Edits:
         """See `Run.reload`."""
         await self._in_turn(partial(self._reload_now, module))
 
-    async def _reload_now(self, module: str | ModuleType) -> list[Worker]:
+    async def _reload_now(self, module: str | ModuleType) -> list[RunningNode]:
         with reloaded(self._graph, module) as commands:
             return await self.edit_now(commands)
 
-    async def _in_turn(self, now: Callable[[], Awaitable[list[Worker]]]) -> None:
+    async def _in_turn(self, now: Callable[[], Awaitable[list[RunningNode]]]) -> None:
         """One edit after the other; those who are gone are torn down behind the turn."""
-        async with self.turns.one():
+        async with self.lock.one():
             gone = await now()
         await self.leave(gone)
 
-    async def edit_now(self, commands: Sequence[Command]) -> list[Worker]:
+    async def edit_now(self, commands: Sequence[Command]) -> list[RunningNode]:
         """Carry commands out; gives who is to be torn down behind the turn."""
         self._need_run()
         what = _told(commands)
@@ -127,7 +127,7 @@ class Edits:
         """See `Run.undo`."""
         await self._in_turn(self.undo_now)
 
-    async def undo_now(self) -> list[Worker]:
+    async def undo_now(self) -> list[RunningNode]:
         """Take the last edit back; gives who is to be torn down behind the turn."""
         self._need_run()
         history = history_of(self._graph)
@@ -138,7 +138,7 @@ class Edits:
         """See `Run.redo`."""
         await self._in_turn(self.redo_now)
 
-    async def redo_now(self) -> list[Worker]:
+    async def redo_now(self) -> list[RunningNode]:
         """Carry out again what was undone last; gives who is to be torn down behind the turn."""
         self._need_run()
         history = history_of(self._graph)
@@ -155,7 +155,7 @@ class Edits:
 
     async def _follow(
         self, changes: Sequence[Change], what: str, note: Callable[[], None], *, check: bool
-    ) -> list[Worker]:
+    ) -> list[RunningNode]:
         """Let the run be as the drawn graph is, and note that; if it fails, take back what was done to the graph.
 
         Returns:
@@ -167,13 +167,13 @@ class Edits:
         try:
             self._find_out(edit, check=check)
             torn_down = [*(worker for worker, _, _ in edit.how.swapped), *self._to_start_afresh(edit.switched)]
-            self.turns.wait_for(torn_down, tasks_too=True)
+            self.lock.wait_for(torn_down, tasks_too=True)
             touched = self._touched(edit)
-            self.turns.wait_for(touched)
+            self.lock.wait_for(touched)
             await self._set_up(edit)
-            self.turns.wait_for(touched)
-            async with Held(engine, touched) as held:
-                self.turns.wait_for(())
+            self.lock.wait_for(touched)
+            async with Quiesced(engine, touched) as held:
+                self.lock.wait_for(())
                 await self._exchange_nodes(edit.how)
                 fresh = await self._begin_afresh(edit)
                 self._need_run()
@@ -183,14 +183,14 @@ class Edits:
                     value.do()
                 edit.took_effect = held.done = True
                 note()
-                if engine.core.seldom is not None:
-                    engine.core.seldom(StructureChanged(engine.core.now(), what))
+                if engine.core.trace_changes is not None:
+                    engine.core.trace_changes(StructureChanged(engine.core.now(), what))
                 self._switch(edit.switched, fresh)
                 self._take_effect(edit)
         except BaseException:
             if not edit.took_effect:
                 undo_all([change for change in changes if change not in edit.values])
-                self.turns.wait_for(edit.come)
+                self.lock.wait_for(edit.come)
                 await self._to_its_end(self._tear_down(edit.come))
             raise
         finally:
@@ -214,7 +214,7 @@ class Edits:
         ]
         self._refuse_without_effect(edit)
 
-    async def _begin_afresh(self, edit: _Following) -> list[Worker]:
+    async def _begin_afresh(self, edit: _Following) -> list[RunningNode]:
         """Tear down and set up who is to be enabled, with its new values; gives them back."""
         fresh = self._to_start_afresh(edit.switched)
         self._refuse_without_effect(edit)
@@ -223,9 +223,9 @@ class Edits:
             value.do()
             edit.values.remove(value)
         for worker in fresh:
-            self.turns.wait_for((worker,))
-            await self._hook(worker, lifecycle.tear_down)
-            await self._hook(worker, lifecycle.set_up)
+            self.lock.wait_for((worker,))
+            await self._hook(worker, node_lifecycle.tear_down)
+            await self._hook(worker, node_lifecycle.set_up)
         return fresh
 
     def _values_of_running_nodes(self, changes: Sequence[Change]) -> list[ParameterChange]:
@@ -244,7 +244,7 @@ class Edits:
             [worker for worker in self._engine.core.workers if worker not in afresh],
         )
 
-    def _touched(self, edit: _Following) -> list[Worker]:
+    def _touched(self, edit: _Following) -> list[RunningNode]:
         """Those who must rest: also all inside a subgraph that is enabled."""
         scopes = [worker.scope for worker, enabled in edit.switched.items() if worker.scope is not None and enabled]
         return list(dict.fromkeys([*edit.how.touched, *(member for scope in scopes for member in scope.members)]))
@@ -260,13 +260,13 @@ class Edits:
             said = FlatNode(0, node._place.path, node, edit.how.come[node], ())
             worker = plan.make_worker(engine.core, said, engine.groups)
             edit.come.append(worker)
-            self._lifetime.carry(worker)
+            self._lifecycle.carry(worker)
             worker.be_busy("setup")
-            self.turns.wait_for((worker,))
-            await self._hook(worker, lifecycle.set_up)
-            self._lifetime.came(worker)
+            self.lock.wait_for((worker,))
+            await self._hook(worker, node_lifecycle.set_up)
+            self._lifecycle.came(worker)
 
-    async def _hook(self, worker: Worker, hook: Callable[[Worker, lifecycle.Then], None]) -> None:
+    async def _hook(self, worker: RunningNode, hook: Callable[[RunningNode, node_lifecycle.Then], None]) -> None:
         """Run a hook of a node to its end; if the edit is cancelled meanwhile, so is the hook, and waited for.
 
         Raises:
@@ -286,8 +286,8 @@ class Edits:
                 if cancelled is not None or self._engine.core.over:
                     raise
                 cancelled = error
-                if worker.execution.carrier is not None:
-                    worker.execution.carrier.cancel()
+                if worker.execution.eager_task is not None:
+                    worker.execution.eager_task.cancel()
         if cancelled is not None:
             raise cancelled
         failure = waiter.result()
@@ -304,7 +304,7 @@ class Edits:
 
     async def _exchange_nodes(self, how: PlanDiff) -> None:
         """Tear down the nodes that are replaced and set up the others in their place; back again if that fails."""
-        begun: list[tuple[Worker, Any]] = []
+        begun: list[tuple[RunningNode, Any]] = []
         try:
             for worker, _, node in how.swapped:
                 begun.append((worker, worker.node))
@@ -316,7 +316,7 @@ class Edits:
             worker.start_over()
             worker.allow(ENDED | UNREADY)
 
-    async def _become_again(self, begun: list[tuple[Worker, Any]]) -> None:
+    async def _become_again(self, begun: list[tuple[RunningNode, Any]]) -> None:
         """Put the nodes back that were to be replaced; one that cannot be set up again ends the run."""
         for worker, before in reversed(begun):
             try:
@@ -326,38 +326,38 @@ class Edits:
             else:
                 doing.afresh(worker)
 
-    async def _become(self, worker: Worker, node: Any) -> None:
+    async def _become(self, worker: RunningNode, node: Any) -> None:
         """Let a worker run another node: teardown, setup. A teardown that fails is told with the other errors (X3)."""
-        self.turns.wait_for((worker,))
+        self.lock.wait_for((worker,))
         try:
-            await self._hook(worker, lifecycle.tear_down)
+            await self._hook(worker, node_lifecycle.tear_down)
         except NodeError as error:
             self._engine.core.errors.append(error)
         engine_ports.release_ports(worker)
-        if worker.execution.carrier is not None:
-            worker.execution.carrier.drop()
+        if worker.execution.eager_task is not None:
+            worker.execution.eager_task.drop()
             worker.execution.run_in(None)
-        if worker.flights is not None:
+        if worker.concurrent is not None:
             concurrency.abandon(worker)
-            worker.flights.drop_carriers()
+            worker.concurrent.drop_eager_tasks()
         worker.take_node(node)
         worker.show_activity()
-        self._lifetime.carry(worker)
-        await self._hook(worker, lifecycle.set_up)
+        self._lifecycle.carry(worker)
+        await self._hook(worker, node_lifecycle.set_up)
 
     def _take_effect(self, edit: _Following) -> None:
         """From one moment to the next the run is another."""
         engine, how = self._engine, edit.how
         assert self._index is not None
         new, nodes = apply(engine.core, self._index, self._graph, how, edit.come, engine.groups)
-        lifecycle.end_tasks(edit.come)
+        node_lifecycle.end_tasks(edit.come)
         for edge, flat in new:
             if flat.source.kind == "observable":
-                self._lifetime.feed(flat.source.port, edge, flat.options.through)
+                self._lifecycle.feed(flat.source.port, edge, flat.options.through)
             elif flat.options.through:
-                self._lifetime.pipe(edge, flat.options.through)
+                self._lifecycle.pipe(edge, flat.options.through)
         for edge in how.lost:
-            self._lifetime.forget(edge)
+            self._lifecycle.forget(edge)
         self._tell_parameters(edit.changes)
         swapped = {change.old: change.new for change in edit.changes if isinstance(change, NodeSwap)}
         edited = Edited([worker for worker, _, _ in how.swapped], swapped, nodes)
@@ -366,17 +366,17 @@ class Edits:
         for worker in edited.workers:
             doing.afresh(worker)
         for worker in edit.come:
-            engine.core.upstairs.idle_again(worker)
+            engine.core.rules.idle_again(worker)
         if engine.settings.check_all:
             engine.check_invariants()
 
     def _tell_parameters(self, changes: Sequence[Change]) -> None:
         core = self._engine.core
-        for change in changes if core.seldom is not None else ():
+        for change in changes if core.trace_changes is not None else ():
             if isinstance(change, ParameterChange) and change.node._place is not None:
                 here = core.by_path.get(change.node._place.path)
-                if here is not None and here.node is change.node and core.seldom is not None:
-                    core.seldom(ParameterSet(core.now(), here.path, change.name, change.after))
+                if here is not None and here.node is change.node and core.trace_changes is not None:
+                    core.trace_changes(ParameterSet(core.now(), here.path, change.name, change.after))
 
     def _switched(self, changes: Sequence[Change]) -> _Switched:
         """The nodes, then the subgraphs, that are enabled or disabled, and which of both in the end."""
@@ -384,7 +384,7 @@ class Edits:
             return {}
         assert self._index is not None
         by_node = self._index.by_node
-        swapped: dict[Any, Worker] = {}
+        swapped: dict[Any, RunningNode] = {}
         found: _Switched = {}
         for change in changes:
             if isinstance(change, NodeSwap):
@@ -397,7 +397,7 @@ class Edits:
                     found[worker] = change.after.enabled
         return dict(sorted(found.items(), key=lambda one: one[0].scope is not None))
 
-    def _to_start_afresh(self, switched: _Switched) -> list[Worker]:
+    def _to_start_afresh(self, switched: _Switched) -> list[RunningNode]:
         """Whom to tear down and set up before they are enabled (F10), so that it all takes effect at one moment."""
         on = {worker for worker, enabled in switched.items() if enabled}
         scopes = {worker.scope for worker in on}
@@ -406,49 +406,49 @@ class Edits:
         there = sorted((worker for worker in on | inside if worker.scope is None), key=self._index.leaves.label)
         return [worker for worker in there if _is_to_begin(worker, on, scopes)]
 
-    def _switch(self, switched: _Switched, fresh: Collection[Worker]) -> None:
+    def _switch(self, switched: _Switched, fresh: Collection[RunningNode]) -> None:
         """Enable and disable nodes and subgraphs (F10)."""
         for worker, enabled in switched.items():
             self._note_options(worker, enabled)
             if worker.scope is not None and enabled:
-                subgraphs.enable_scope(worker.scope, lifecycle.nothing, fresh)
+                subgraphs.enable_scope(worker.scope, node_lifecycle.nothing, fresh)
             elif worker.scope is not None:
                 subgraphs.disable_scope(worker.scope)
             elif enabled:
-                lifecycle.enable(worker, lifecycle.nothing, fresh=worker in fresh)
+                node_lifecycle.enable(worker, node_lifecycle.nothing, fresh=worker in fresh)
             else:
-                lifecycle.disable(worker)
+                node_lifecycle.disable(worker)
 
-    def _note_options(self, worker: Worker, enabled: bool) -> None:
+    def _note_options(self, worker: RunningNode, enabled: bool) -> None:
         if worker.options is not None:
             worker.set_options(msgspec.structs.replace(worker.options, enabled=enabled))
 
-    async def leave(self, gone: list[Worker]) -> None:
+    async def leave(self, gone: list[RunningNode]) -> None:
         """Nodes that are gone are torn down, also if nobody waits for that any more."""
         if not gone:
             return
         task = asyncio.create_task(self._tear_down(gone), name="hfg edit")
-        self._lifetime.leaving.add(task)
-        task.add_done_callback(self._lifetime.leaving.discard)
+        self._lifecycle.leaving.add(task)
+        task.add_done_callback(self._lifecycle.leaving.discard)
         await asyncio.shield(task)
 
-    async def _tear_down(self, workers: Iterable[Worker]) -> None:
+    async def _tear_down(self, workers: Iterable[RunningNode]) -> None:
         """Let nodes that are gone close what they have opened; if that fails, it is told with other errors (X3)."""
         engine = self._engine
         for worker in workers:
             worker.cancel_timers()
         for worker in workers:
             try:
-                await self._hook(worker, lifecycle.tear_down)
+                await self._hook(worker, node_lifecycle.tear_down)
             except HfgError as error:
                 engine.core.errors.append(error)
             engine_ports.release_ports(worker)
-            self._lifetime.forget(worker)
-            if worker.execution.carrier is not None:
-                worker.execution.carrier.drop()
-            if worker.flights is not None:
+            self._lifecycle.forget(worker)
+            if worker.execution.eager_task is not None:
+                worker.execution.eager_task.drop()
+            if worker.concurrent is not None:
                 concurrency.abandon(worker)
-                worker.flights.drop_carriers()
+                worker.concurrent.drop_eager_tasks()
 
 
 def _take_values(edit: _Following) -> None:
@@ -490,7 +490,7 @@ def _refuse_for_good(change: Change) -> None:
             )
 
 
-def _is_to_begin(worker: Worker, on: Collection[Worker], scopes: Set[Scope | None]) -> bool:
+def _is_to_begin(worker: RunningNode, on: Collection[RunningNode], scopes: Set[Scope | None]) -> bool:
     """Whether it is off and will be on, with all around it (F10); in a back-off it is set up when that is over."""
     if not worker.blocked & DISABLED or worker.blocked & BACKOFF:
         return False

@@ -15,8 +15,8 @@ import msgspec
 
 from hfg.base.logs import Log
 from hfg.base.token import Token
-from hfg.engine.model.worker import NO_CALLS, Worker
-from hfg.engine.rules import iterating, quiet
+from hfg.engine.model.running_node import NO_CALLS, RunningNode
+from hfg.engine.rules import iterating, quiescence
 from hfg.engine.runtime.callbacks import Edited
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.places import behind, edges_at, is_gone, is_near, place_of
@@ -102,10 +102,10 @@ class Pausing:
         self._on_hit: Callable[[Breakpoint], None] = lambda _: None
         self._stepping = False
         self._waiters: list[asyncio.Future[None]] = []  # for a pause, or for what is under way to be over
-        self._at_nodes: dict[Worker, Breakpoint] = {}
+        self._at_nodes: dict[RunningNode, Breakpoint] = {}
         self._at_edges: dict[Breakpoint, Callable[[], None]] = {}
         self._labels_at: dict[Breakpoint, frozenset[str]] = {}
-        self._waived: set[Worker] = set()  # stopped here already: goes on when the run does
+        self._waived: set[RunningNode] = set()  # stopped here already: goes on when the run does
         engine.callbacks.rested.append(self._rest)
         engine.callbacks.finished.append(self._rest)
         engine.callbacks.edited.append(self._find_again)
@@ -118,7 +118,7 @@ class Pausing:
         if self.paused or engine.core.over:
             return
         self.paused, self.why = True, why
-        self._hold_groups(True)
+        self._pause_groups(True)
         engine.core.flags.append("paused")
         if engine.core.trace is not None:
             engine.core.trace(RunPaused(engine.now(), why))
@@ -136,15 +136,15 @@ class Pausing:
             raise UsageError("a step is under way: await it before run.resume()")
         engine = self._engine
         self.paused, self.why = False, ""
-        self._hold_groups(False)
+        self._pause_groups(False)
         if engine.core.trace is not None:
             engine.core.trace(RunResumed(engine.now()))
         engine.kick()
 
-    def _hold_groups(self, held: bool) -> None:
-        self._engine.core.hold(held)
+    def _pause_groups(self, paused: bool) -> None:
+        self._engine.core.pause(paused)
         for group in self._engine.groups.values():
-            group.hold(held)
+            group.pause(paused)
 
     def _rest(self) -> None:
         """The pump would go on now: tell those who wait for the pause, or for the end of what is under way."""
@@ -193,8 +193,8 @@ class Pausing:
         """Let each node make at most one firing and one call, those that become enabled by that included."""
         self._begin("a wave")
         moved: list[str] = []
-        done: set[tuple[Worker, str]] = set()
-        workers: list[Worker] = []
+        done: set[tuple[RunningNode, str]] = set()
+        workers: list[RunningNode] = []
         try:
             self._let_elements_in()
             while not self._engine.core.over:
@@ -212,7 +212,7 @@ class Pausing:
             self._stepping = False
         return Step(tuple(moved), "" if moved else "no node can move")
 
-    def _next_in_wave(self, done: set[tuple[Worker, str]]) -> Worker | None:
+    def _next_in_wave(self, done: set[tuple[RunningNode, str]]) -> RunningNode | None:
         """Who moves next in a wave in which these have moved already.
 
         They stay in their queues, for what they do next may change: who fired may be called.
@@ -258,22 +258,22 @@ class Pausing:
         for region in list(self._engine.core.regions):
             region.dissolve()
 
-    def _queued(self) -> Iterator[Worker]:
+    def _queued(self) -> Iterator[RunningNode]:
         """Those that could move now, group by group."""
         for group in self._engine.groups.values():
             if not group.full:
                 yield from list(group.policy)
 
-    def _why_not(self, worker: Worker) -> str:
+    def _why_not(self, worker: RunningNode) -> str:
         if worker.busy:
             return f'"{worker.path}" is in the middle of a {worker.busy}'
         if worker.group.full:
             return f'group "{worker.group.name}" of "{worker.path}" is still at work'
         if worker.queued and _next_kind(worker):
             return ""
-        return f'"{worker.path}" {quiet.waits_for(worker)}'
+        return f'"{worker.path}" {quiescence.waits_for(worker)}'
 
-    def _let(self, worker: Worker) -> None:
+    def _let(self, worker: RunningNode) -> None:
         """Make its next step, as the pump would."""
         engine = self._engine
         worker.group.policy.remove(worker)
@@ -281,7 +281,7 @@ class Pausing:
         engine.guard(lambda: worker.step(worker))
         self._waived.discard(worker)
 
-    async def _over(self, workers: list[Worker]) -> None:
+    async def _over(self, workers: list[RunningNode]) -> None:
         while _any_works(workers) and not self._engine.core.over:
             await self._change()
 
@@ -307,7 +307,7 @@ class Pausing:
             raise UsageError("when= looks at a token: give an edge or a port of the node, not the node")
         return self._at_node(self._single(place, "stop at"))
 
-    def _single(self, node: Any, what: str) -> Worker:
+    def _single(self, node: Any, what: str) -> RunningNode:
         if isinstance(node, str):
             node = self._engine.graph[node]
         worker = self._engine.worker_of(node)
@@ -315,7 +315,7 @@ class Pausing:
             raise UsageError(f'"{worker.path}" is a subgraph: {what} a node inside (G1)')
         return worker
 
-    def _at_node(self, worker: Worker) -> Breakpoint:
+    def _at_node(self, worker: RunningNode) -> Breakpoint:
         """Pause before each firing and call of a node."""
         found = self._at_nodes.get(worker)
         if found is None:
@@ -383,10 +383,10 @@ class Pausing:
             self._waived.discard(worker)
             worker.halt_at(None)
 
-    def _behind(self, point: Breakpoint, step: Callable[[Worker], None]) -> Callable[[Worker], None]:
+    def _behind(self, point: Breakpoint, step: Callable[[RunningNode], None]) -> Callable[[RunningNode], None]:
         """The step of a worker, behind its breakpoint."""
 
-        def stop_first(worker: Worker) -> None:
+        def stop_first(worker: RunningNode) -> None:
             if worker in self._waived or worker.busy or not _next_kind(worker):
                 self._waived.discard(worker)
                 step(worker)
@@ -407,19 +407,19 @@ def _path(place: Any, labels: Sequence[str]) -> str:
     return str(getattr(place, "path", "") or next(iter(labels), ""))
 
 
-def _any_works(workers: list[Worker]) -> bool:
+def _any_works(workers: list[RunningNode]) -> bool:
     """Whether a step of one of them will be over by itself; who waits for room in a queue (F8) may not be."""
     return any(
-        (worker.busy or worker.is_flying()) and not worker.room.waiting and worker.iteration is None
+        (worker.busy or worker.has_concurrent_code()) and not worker.room.waiting and worker.iteration is None
         for worker in workers
     )
 
 
-def _next_kind(worker: Worker) -> str:
+def _next_kind(worker: RunningNode) -> str:
     """What a worker in a run queue would do; "" if what it was queued for is gone, or is no firing of a node."""
     if worker.is_boundary_output:
         return ""
     calls = worker.calls
-    if worker.placed and not (calls and worker.ahead):
+    if worker.fireable and not (calls and worker.calls_before):
         return "firing"
     return "call" if calls and worker.blocked < NO_CALLS else ""

@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from hfg.engine.editing.plan_index import PlanIndex
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.graph import Graph
 from hfg.graph.editing.changes import (
     Change,
@@ -63,19 +63,19 @@ class PlanDiff(msgspec.Struct, eq=False):
     """
 
     come: dict[Any, NodeOptions] = {}
-    gone: list[Worker] = []
-    swapped: list[tuple[Worker, Any, Any]] = []
-    placed: list[Worker] = []
-    options: list[tuple[Worker, NodeOptions]] = []
-    renamed: list[Worker] = []
+    gone: list[RunningNode] = []
+    swapped: list[tuple[RunningNode, Any, Any]] = []
+    placed: list[RunningNode] = []
+    options: list[tuple[RunningNode, NodeOptions]] = []
+    renamed: list[RunningNode] = []
     boxes_come: dict[Any, NodeOptions] = {}
-    boxes_gone: list[Worker] = []
-    boxes_placed: list[Worker] = []
+    boxes_gone: list[RunningNode] = []
+    boxes_placed: list[RunningNode] = []
     old: list[Any] = []
     ways: list[tuple[FlatEdge, Any]] = []
     lost: list[Any] = []
     gates: bool = False
-    touched: list[Worker] = []
+    touched: list[RunningNode] = []
     doubtful: bool = False
 
 
@@ -102,20 +102,20 @@ class _Comparing:
         self.index = index
         self.changes = changes
         self.found = PlanDiff()
-        self.swaps: dict[Any, Worker | None] = {}  # by the node of now: the worker that had another; None: not now
+        self.swaps: dict[Any, RunningNode | None] = {}  # by the node of now: the worker that had another; None: not now
         self.insides: list[Level] = []  # of subgraphs that came, went or moved
         self.follower = _Follower(graph)
 
     # --- nodes
 
-    def worker_of(self, node: Any) -> Worker | None:
+    def worker_of(self, node: Any) -> RunningNode | None:
         """The worker that a node has, or takes over."""
         return self.swaps[node] if node in self.swaps else self.index.by_node.get(node)
 
     def nodes(self) -> None:
         """Look at the nodes that changes name, and at all inside them."""
         found = self.found
-        swapped: dict[Worker, Any] = {}
+        swapped: dict[RunningNode, Any] = {}
         placed: dict[Any, None] = {}
         told: dict[Any, None] = {}
         for change in self.changes:
@@ -267,7 +267,7 @@ class _Comparing:
         begin, end = self._of_node(source.port) or source.port, self._of_node(target.port) or target.port
         return begin, _kind(source.port), source.name, end, _kind(target.port), target.name, roomy
 
-    def _of_node(self, port: Any) -> Worker | None:
+    def _of_node(self, port: Any) -> RunningNode | None:
         """The worker of a port's node; that of a port's inner side is known by the port alone (G4)."""
         node = getattr(port, "node", None)
         return None if node is None or isinstance(port, InnerSource | InnerTarget) else self.worker_of(node)
@@ -357,7 +357,7 @@ class _Comparing:
                     return True
         return False
 
-    def _at_border(self, port: InnerTarget[Any]) -> Worker | None:
+    def _at_border(self, port: InnerTarget[Any]) -> RunningNode | None:
         """Who reads what comes out of a subgraph that iterates, if anybody does."""
         box = self.worker_of(port.node)
         readers = () if box is None or box.iteration is None else box.iteration.readers
@@ -368,7 +368,7 @@ class _Comparing:
     def touch(self) -> None:
         """Find who must not fire while it is done."""
         found = self.found
-        touched: dict[Worker | None, None] = {}
+        touched: dict[RunningNode | None, None] = {}
         for way, running in found.ways:
             if running is None:
                 touched |= {self._of_node(way.source.port): None, self._of_node(way.target.port): None}

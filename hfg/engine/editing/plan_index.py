@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from hfg.engine.model import Core, Worker
+from hfg.engine.model import Core, RunningNode
 from hfg.graph.structure.sequence import Sequence
 from hfg.ports.edges import EventEdge
 
@@ -33,7 +33,9 @@ class PlanIndex:
     """
 
     def __init__(self, core: Core) -> None:
-        self.by_node: dict[Any, Worker] = {worker.node: worker for worker in core.workers if worker.node is not None}
+        self.by_node: dict[Any, RunningNode] = {
+            worker.node: worker for worker in core.workers if worker.node is not None
+        }
         self.leaves = Sequence(worker for worker in core.workers if worker.node is not None and worker.scope is None)
         self.scopes = Sequence(scope.worker for scope in core.scopes if scope.worker is not None)
         self.edges: Sequence[Any] = Sequence(edge for edge in core.edges if edge.segments)

@@ -10,8 +10,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from hfg.base.values import own_copy
-from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, DISABLED, Worker
-from hfg.engine.rules import lifecycle
+from hfg.engine.model.running_node import BACKOFF, BETWEEN_FIRINGS, DISABLED, RunningNode
+from hfg.engine.rules import node_lifecycle
 from hfg.errors import NotRunning, UsageError
 from hfg.graph.structure.level import inside
 from hfg.graph.structure.promoting import stands_for
@@ -66,28 +66,28 @@ def need_settable(engine: Engine, port: ParameterPort[Any], value: Any) -> list[
     return reached
 
 
-def _write(worker: Worker, node: Node, name: str, value: Any) -> None:
+def _write(worker: RunningNode, node: Node, name: str, value: Any) -> None:
     """Let the node work with the value from now on."""
     core = worker.core
     node._parameters[name] = own_copy(value)
-    if core.seldom is not None:
-        core.seldom(ParameterSet(core.now(), worker.path, name, value))
+    if core.trace_changes is not None:
+        core.trace_changes(ParameterSet(core.now(), worker.path, name, value))
 
 
-def _between_firings(worker: Worker, write: Callable[[], None]) -> None:
+def _between_firings(worker: RunningNode, write: Callable[[], None]) -> None:
     """Do it now, or as soon as the firing or call under way is over; nobody waits for that."""
-    if worker.busy in AMID_NOTHING and not worker.is_on_fast_path():
+    if worker.busy in BETWEEN_FIRINGS and not worker.is_on_fast_path():
         write()
         return
 
-    def in_turn(_worker: Worker, over: Callable[[], None]) -> None:
+    def in_turn(_worker: RunningNode, over: Callable[[], None]) -> None:
         write()
         over()
 
-    lifecycle.when_idle(worker, in_turn, lifecycle.nothing)
+    node_lifecycle.when_idle(worker, in_turn, node_lifecycle.nothing)
 
 
-def refuse_without_effect(parameters: Sequence[tuple[Any, str]], workers: Iterable[Worker]) -> None:
+def refuse_without_effect(parameters: Sequence[tuple[Any, str]], workers: Iterable[RunningNode]) -> None:
     """Refuse a change that none of the code that runs would see.
 
     Args:
@@ -120,7 +120,7 @@ def without_effect(node: Any, name: str) -> UsageError:
     )
 
 
-def _has_its_values(worker: Worker) -> bool:
+def _has_its_values(worker: RunningNode) -> bool:
     """Whether its code was given the parameters once and for all, and goes on with them."""
     if not worker.type.given_parameters_once or worker.blocked & (DISABLED | BACKOFF):
         return False  # these begin afresh

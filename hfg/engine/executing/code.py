@@ -16,29 +16,29 @@ from functools import partial
 from types import CoroutineType
 from typing import Any, Protocol
 
-from hfg.engine.executing.carrier import Carrier
+from hfg.engine.executing.eager_task import EagerTask
 from hfg.engine.executing.groups import Job
 from hfg.engine.executing.virtual import VirtualTimeLoop
-from hfg.engine.model import Core, Flight, RunningEvent, Worker
+from hfg.engine.model import ConcurrentFiring, Core, RunningEvent, RunningNode
 from hfg.engine.model.core import PENDING
-from hfg.engine.model.current import current_flight, current_task
+from hfg.engine.model.current import current_firing, current_task
 from hfg.engine.rules import concurrency, errors
-from hfg.engine.rules.sending import trigger, trigger_beside
+from hfg.engine.rules.sending import trigger, trigger_from_task
 
-__all__ = ["CodeRunner", "answer", "speak_for", "whose_code"]
+__all__ = ["CodeRunner", "answer", "run_as", "whose_code"]
 
-_code_of: contextvars.ContextVar[Worker | None] = contextvars.ContextVar("hfg.code_of", default=None)
+_code_of: contextvars.ContextVar[RunningNode | None] = contextvars.ContextVar("hfg.code_of", default=None)
 
 Done = Callable[[Any, BaseException | None], None]
 _Outcome = tuple[Any, Exception | None]
 
 
-def whose_code() -> Worker | None:
-    """Give the async node in whose code, or in a task it has started, this is called."""
+def whose_code() -> RunningNode | None:
+    """Give the async node in whose code, or in a task it has firing, this is called."""
     return _code_of.get()
 
 
-def speak_for(worker: Worker) -> None:
+def run_as(worker: RunningNode) -> None:
     """From here on, in this context, it is the code of this async node that runs."""
     _code_of.set(worker)
 
@@ -78,7 +78,7 @@ class CodeRunner:
     """Runs the code of the nodes of one engine; see `core.Code`.
 
     Attributes:
-      given_up: carriers of firings that took too long, until their code has ended.
+      given_up: eager_tasks of firings that took too long, until their code has ended.
       aside: hooks of activity that wait.
       came_back: set when code that was under way at the end of the run is over.
       holds: work in threads for which virtual time stands still.
@@ -97,7 +97,7 @@ class CodeRunner:
         self.holds = 0
         self._early_signals: dict[int, list[Callable[[], None]]] = {}
 
-    def execute(self, worker: Worker, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
+    def execute(self, worker: RunningNode, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
         """See `core.Code`."""
         if worker.group.threaded and not inspect.iscoroutinefunction(call):
             self._in_thread(worker, call, arguments, done)
@@ -108,7 +108,7 @@ class CodeRunner:
         else:
             done(result, error)
 
-    def _call(self, worker: Worker, call: Callable[..., Any], arguments: tuple[Any, ...]) -> _Outcome:
+    def _call(self, worker: RunningNode, call: Callable[..., Any], arguments: tuple[Any, ...]) -> _Outcome:
         """Call what is a node's code, or begins with it; gives what that gave back, and what it raised."""
         self.core.current = worker  # which stays so if what is raised is no error of the node
         try:
@@ -119,26 +119,26 @@ class CodeRunner:
         self.core.current = None
         return result, None
 
-    def drive(self, worker: Worker, coroutine: Any, done: Done) -> None:
+    def drive(self, worker: RunningNode, coroutine: Any, done: Done) -> None:
         """See `core.Code`."""
-        carrier = worker.execution.carrier
-        if carrier is None:
-            carrier = self.carrier(worker)
-            worker.execution.run_in(carrier)
-        result, error = self._call(worker, carrier.start, (coroutine, self.late(worker, done)))
+        eager_task = worker.execution.eager_task
+        if eager_task is None:
+            eager_task = self.eager_task(worker)
+            worker.execution.run_in(eager_task)
+        result, error = self._call(worker, eager_task.start, (coroutine, self.late(worker, done)))
         if result is not PENDING:
             done(result, error)
             return
-        worker.set_out()
+        worker.begin_async()
         self._limit(worker)
 
-    def carrier(self, worker: Worker) -> Carrier:
+    def eager_task(self, worker: RunningNode) -> EagerTask:
         """Make the dormant task of an async node, in a context that tells whose code runs."""
         context = self.context.copy()
-        context.run(speak_for, worker)
-        return Carrier(self.loop, f"hfg {worker.path}", self.context, context, self._engine.give_way)
+        context.run(run_as, worker)
+        return EagerTask(self.loop, f"hfg {worker.path}", self.context, context, self._engine.give_way)
 
-    def _limit(self, worker: Worker) -> None:
+    def _limit(self, worker: RunningNode) -> None:
         """X2: the firing may not take longer than its limit."""
         options = worker.options
         if options is not None and options.max_duration_s is not None and worker.busy == "firing":
@@ -146,99 +146,101 @@ class CodeRunner:
 
     # --- several firings of a node at once (F14) --------------------------------------------------------------------
 
-    def execute_beside(self, flight: Flight, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
+    def execute_concurrent(
+        self, firing: ConcurrentFiring, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
+    ) -> None:
         """See `core.Code`."""
-        worker = flight.worker
+        worker = firing.worker
         if worker.group.threaded and not inspect.iscoroutinefunction(call):
-            self._beside_in_thread(flight, call, arguments, done)
+            self._concurrent_in_thread(firing, call, arguments, done)
             return
-        outside = current_flight.set(flight)
+        outside = current_firing.set(firing)
         result, error = self._call(worker, call, arguments)
-        current_flight.reset(outside)
+        current_firing.reset(outside)
         if type(result) is CoroutineType or hasattr(result, "__await__"):
-            self.drive_beside(flight, result, done)
+            self.drive_concurrent(firing, result, done)
         else:
             done(result, error)
 
-    def drive_beside(self, flight: Flight, coroutine: Any, done: Done) -> None:
+    def drive_concurrent(self, firing: ConcurrentFiring, coroutine: Any, done: Done) -> None:
         """See `core.Code`."""
-        worker = flight.worker
-        flights: Any = worker.flights
-        carrier = flights.lend() or self.carrier(worker)
-        carrier.enter(current_flight.set, flight)  # what its code sends is its own
-        late = self._late_beside(flight, carrier, done)
-        result, error = self._call(worker, carrier.start, (coroutine, late))
+        worker = firing.worker
+        concurrent: Any = worker.concurrent
+        eager_task = concurrent.lend() or self.eager_task(worker)
+        eager_task.enter(current_firing.set, firing)  # what its code sends is its own
+        late = self._late_concurrent(firing, eager_task, done)
+        result, error = self._call(worker, eager_task.start, (coroutine, late))
         if result is not PENDING:
-            flights.give_back(carrier)
+            concurrent.give_back(eager_task)
             done(result, error)
             return
-        flight.work(carrier=carrier)
-        limit = flight.limit_s
+        firing.work(eager_task=eager_task)
+        limit = firing.limit_s
         if limit is not None:
-            flight.limit(worker.core.after(limit, partial(concurrency.time_out, flight)))
+            firing.limit(worker.core.after(limit, partial(concurrency.time_out, firing)))
 
-    def _late_beside(self, flight: Flight, carrier: Carrier, done: Done) -> Done:
+    def _late_concurrent(self, firing: ConcurrentFiring, eager_task: EagerTask, done: Done) -> Done:
         """What to call when the code of the firing, which waited, is over."""
 
         def over(result: Any, error: BaseException | None) -> None:
-            if flight.carrier is carrier:
-                flight.rest()
-                flights: Any = flight.worker.flights
-                flights.give_back(carrier)
+            if firing.eager_task is eager_task:
+                firing.rest()
+                concurrent: Any = firing.worker.concurrent
+                concurrent.give_back(eager_task)
             else:
-                self._drop(carrier)
+                self._drop(eager_task)
             self._tell(done, result, error)
             self._engine.go_on()
 
         return over
 
-    def _beside_in_thread(
-        self, flight: Flight, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
+    def _concurrent_in_thread(
+        self, firing: ConcurrentFiring, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
     ) -> None:
-        worker = flight.worker
+        worker = firing.worker
         group: Any = worker.group
 
         def in_thread(*arguments: Any) -> Any:
-            current_flight.set(flight)
+            current_firing.set(firing)
             return call(*arguments)
 
         def back(job: Job) -> None:
             group.returned(job)
-            if flight.job is job:
-                flight.rest()
+            if firing.job is job:
+                firing.rest()
             self._tell(done, job.result, job.error)
 
         job = Job(worker, back, in_thread, arguments, done)
-        flight.work(job=job)
-        limit = flight.limit_s
-        time_out = partial(concurrency.time_out, flight)
+        firing.work(job=job)
+        limit = firing.limit_s
+        time_out = partial(concurrency.time_out, firing)
         if isinstance(self.loop, VirtualTimeLoop):
             self._hold(job, limit, time_out)
         elif limit is not None:
-            flight.limit(worker.core.after(limit, time_out))
+            firing.limit(worker.core.after(limit, time_out))
         group.submit(job)
 
-    def interrupt_beside(self, flight: Flight) -> None:
+    def interrupt_concurrent(self, firing: ConcurrentFiring) -> None:
         """See `core.Code`."""
-        carrier, job = flight.rest()
+        eager_task, job = firing.rest()
         if job is not None:
-            self._abandon(job, flight.worker, flight.number)
-        elif carrier is not None:
-            self._give_up(carrier)
+            self._abandon(job, firing.worker, firing.number)
+        elif eager_task is not None:
+            self._give_up(eager_task)
 
-    def late(self, worker: Worker, done: Done) -> Done:
+    def late(self, worker: RunningNode, done: Done) -> Done:
         """See `core.Code`."""
         closing = self.core.over  # a hook of the teardown; what began before the end is not listened to after it
 
         def over(result: Any, error: BaseException | None) -> None:
-            if worker.execution.in_flight and (worker.execution.carrier is carrier or carrier is None):
-                worker.come_back()
+            if worker.execution.in_flight and (worker.execution.eager_task is eager_task or eager_task is None):
+                worker.end_async()
             else:
-                self._drop(carrier)
+                self._drop(eager_task)
             self._tell(done, result, error, closing=closing)
             self._engine.go_on()
 
-        carrier = worker.execution.carrier
+        eager_task = worker.execution.eager_task
         return over
 
     def _tell(self, done: Done, result: Any, error: BaseException | None, *, closing: bool = False) -> None:
@@ -252,18 +254,18 @@ class CodeRunner:
         except Exception as fault:
             self._engine.internal_fault(fault)
 
-    def _give_up(self, carrier: Carrier) -> None:
+    def _give_up(self, eager_task: EagerTask) -> None:
         """X2: nobody listens to this code any more; it is cancelled, and its task let go when it has ended."""
-        self.given_up.add(carrier)
-        carrier.cancel()
+        self.given_up.add(eager_task)
+        eager_task.cancel()
 
-    def _drop(self, carrier: Carrier) -> None:
+    def _drop(self, eager_task: EagerTask) -> None:
         """The code that was given up has ended, so its task has nothing to do any more."""
-        if carrier in self.given_up:
-            self.given_up.discard(carrier)
-            carrier.drop()
+        if eager_task in self.given_up:
+            self.given_up.discard(eager_task)
+            eager_task.drop()
 
-    def _abandon(self, job: Job, amid: Worker, firing: int) -> None:
+    def _abandon(self, job: Job, amid: RunningNode, firing: int) -> None:
         """X2: nobody listens to this job any more, and its group goes on in another thread."""
         job.disown()
         self._hold_no_more(job)
@@ -271,7 +273,7 @@ class CodeRunner:
         group.abandon(f'"{amid.path}", firing {firing}', job)
 
     def execute_wave(
-        self, workers: Sequence[Worker], call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
+        self, workers: Sequence[RunningNode], call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
     ) -> None:
         """See `core.Code`."""
         job = self._in_thread(workers[0], call, arguments, done, always=True)
@@ -280,7 +282,7 @@ class CodeRunner:
 
     def _in_thread(
         self,
-        worker: Worker,
+        worker: RunningNode,
         call: Callable[..., Any],
         arguments: tuple[Any, ...],
         done: Done,
@@ -289,13 +291,13 @@ class CodeRunner:
     ) -> Job:
         group: Any = worker.group
         closing = self.core.over
-        worker.set_out()
+        worker.begin_async()
 
         def back(job: Job) -> None:
             if job is not worker_job:
                 return
             group.returned(job)
-            worker.come_back()
+            worker.end_async()
             if self.core.over:
                 self.came_back.set()
             if not self.core.over or closing or always:
@@ -317,7 +319,7 @@ class CodeRunner:
             self._engine.beside_work = 0
         self.holds += 1
         held = self.loop.hold()  # type: ignore[attr-defined]  # a loop in virtual time
-        job.hold(held)
+        job.keep_time(held)
         if limit_s is not None:
             held.limit(limit_s, partial(self.context.run, self._given_up, time_out))
 
@@ -326,18 +328,18 @@ class CodeRunner:
         loop = self.loop
         if isinstance(loop, VirtualTimeLoop):
             for worker in self.core.workers:
-                for job in (worker.execution.job, *[flight.job for flight in worker.flights or ()]):
-                    if job is not None and job.held is not None:
-                        job.held.limit(seconds, partial(self._hold_no_more, job))
+                for job in (worker.execution.job, *[firing.job for firing in worker.concurrent or ()]):
+                    if job is not None and job.time_hold is not None:
+                        job.time_hold.limit(seconds, partial(self._hold_no_more, job))
 
     def _hold_no_more(self, job: Job) -> None:
-        if job.held is not None:
-            self.loop.drop(job.held)  # type: ignore[attr-defined]
+        if job.time_hold is not None:
+            self.loop.drop(job.time_hold)  # type: ignore[attr-defined]
             self._came_in(job)
 
     def _came_in(self, job: Job) -> None:
         """Time does not stand still for it any more, and the pump need not wait for it."""
-        job.hold(None)
+        job.keep_time(None)
         self.holds -= 1
         self._engine.beside_work = 0
 
@@ -345,7 +347,7 @@ class CodeRunner:
         self._engine.guard(time_out)
         self._engine.go_on()
 
-    def execute_aside(self, worker: Worker, call: Callable[..., Any], done: Done) -> None:
+    def execute_hook(self, worker: RunningNode, call: Callable[..., Any], done: Done) -> None:
         """See `core.Code`."""
         try:
             result = call()
@@ -357,7 +359,7 @@ class CodeRunner:
         if type(result) is not CoroutineType:
             done(result, None)
             return
-        self.core.set_out()
+        self.core.begin_async()
 
         async def aside() -> None:
             error: BaseException | None = None
@@ -368,7 +370,7 @@ class CodeRunner:
             except BaseException as problem:
                 error = problem
             finally:
-                self.core.come_back()
+                self.core.end_async()
             if not self.core.over:
                 done(None, error)
                 self._engine.kick()
@@ -377,18 +379,18 @@ class CodeRunner:
         self.aside.add(task)
         task.add_done_callback(self.aside.discard)
 
-    def interrupt(self, worker: Worker, *, amid: Worker | None = None) -> None:
+    def interrupt(self, worker: RunningNode, *, amid: RunningNode | None = None) -> None:
         """See `core.Code`; `amid`: whose call it is, if that is another node's of its region."""
         if not worker.execution.in_flight:
             return
-        job, carrier = worker.execution.job, worker.execution.carrier
-        worker.come_back()
+        job, eager_task = worker.execution.job, worker.execution.eager_task
+        worker.end_async()
         if worker.group.threaded:
             amid = amid or worker
             self._abandon(job, amid, amid.counts.firings)
         else:
             worker.execution.run_in(None)
-            self._give_up(carrier)
+            self._give_up(eager_task)
 
     async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
         """Trigger, then wait until no `wait` queue behind the node's events is full (F8)."""
@@ -397,14 +399,14 @@ class CodeRunner:
         task = current_task.get()
         own: Any = worker.room.wait if whose_code() is worker else _nobody_waits  # its own waits for us
         if task is not None and task.worker is worker:
-            trigger_beside(event, value, activity, stamp)
+            trigger_from_task(event, value, activity, stamp)
             own = worker.tasks.wait_for_room
         else:
             trigger(event, value, activity, stamp)
         while worker.room.full_edges and core.started and not core.over:
             await self._room(worker, own)
 
-    async def _room(self, worker: Worker, own: Callable[[int], None]) -> None:
+    async def _room(self, worker: RunningNode, own: Callable[[int], None]) -> None:
         """Wait until there is room behind all events of a worker; `own` counts who of it waits."""
         waiter: asyncio.Future[None] = self.loop.create_future()
         waits = True
@@ -420,7 +422,7 @@ class CodeRunner:
         worker.room.when_free(over)
         own(1)
         self._look_for_room()
-        worker.core.host.kick()
+        worker.core.runtime.kick()
         try:
             await waiter
         finally:
@@ -429,8 +431,8 @@ class CodeRunner:
 
     def _look_for_room(self) -> None:
         """An edit that waits for this code must not hold those who could make room."""
-        if self.core.holding is not None:
-            self.core.holding.look_for_room()
+        if self.core.quiescing is not None:
+            self.core.quiescing.look_for_room()
 
     # --- from threads -----------------------------------------------------------------------------------------------
 
@@ -463,7 +465,7 @@ class CodeRunner:
         signals = self._early_signals.pop(id(box), [])
 
         def arrive() -> None:
-            if item.held is not None:
+            if item.time_hold is not None:
                 self._came_in(item)
             for signal in signals:
                 if not self.core.over:
@@ -471,7 +473,7 @@ class CodeRunner:
             self._engine.guard(partial(item.owner, item))
             self._engine.go_on()
 
-        if item.held is None:
+        if item.time_hold is None:
             arrive()
         else:
-            item.held.deliver = partial(self.context.run, arrive)
+            item.time_hold.deliver = partial(self.context.run, arrive)

@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
-from hfg.engine.model import Group, Worker
+from hfg.engine.model import Group, RunningNode
 from hfg.engine.model.groups import Policy
 from hfg.errors import UsageError
 
@@ -27,7 +27,7 @@ _DISPATCH_STEPS = 16  # how much one group may do on the loop before others have
 class LoopGroup(Group):
     """The nodes that run on the event loop itself."""
 
-    def __init__(self, name: str, policy: Policy[Worker], clock: Callable[[], float]) -> None:
+    def __init__(self, name: str, policy: Policy[RunningNode], clock: Callable[[], float]) -> None:
         super().__init__(name, policy, clock)
         self.in_a_row = True
         if self.charges is not None:
@@ -78,7 +78,7 @@ class CheckedTurn:
         turn.step(turn)
         if self._of_all is not None:
             self._of_all()
-        elif isinstance(turn, Worker) and not turn.core.over:
+        elif isinstance(turn, RunningNode) and not turn.core.over:
             turn.check_invariants()
 
 
@@ -88,7 +88,7 @@ class SideGroup(LoopGroup):
     def __init__(
         self,
         name: str,
-        policy: Policy[Worker],
+        policy: Policy[RunningNode],
         clock: Callable[[], float],
         ready_groups: deque[Dispatching],
         flags: Sequence[str],
@@ -100,11 +100,11 @@ class SideGroup(LoopGroup):
         self._ready_groups = ready_groups
         self._stands = False  # in ready_groups
 
-    def _push(self, worker: Worker) -> None:
+    def _push(self, worker: RunningNode) -> None:
         self._into[0](worker)
         self._stand()
 
-    def _push_next(self, worker: Worker) -> None:
+    def _push_next(self, worker: RunningNode) -> None:
         self._into[1](worker)
         self._stand()
 
@@ -118,7 +118,7 @@ class SideGroup(LoopGroup):
         self._stands = False
         moved = 0
         try:
-            while moved < _DISPATCH_STEPS and not (self.held or self._flags) and len(self.policy):
+            while moved < _DISPATCH_STEPS and not (self.paused or self._flags) and len(self.policy):
                 moved += 1
                 worker = self.take()
                 worker.step(worker)
@@ -130,11 +130,11 @@ class SideGroup(LoopGroup):
 class Job:
     """A call for a thread, and what came of it."""
 
-    __slots__ = ("arguments", "began", "call", "done", "error", "held", "lane", "owner", "result", "worker")
+    __slots__ = ("arguments", "began", "call", "done", "error", "lane", "owner", "result", "time_hold", "worker")
 
     def __init__(
         self,
-        worker: Worker,
+        worker: RunningNode,
         owner: Any,
         call: Callable[..., Any],
         arguments: tuple[Any, ...],
@@ -146,7 +146,7 @@ class Job:
         self.arguments = arguments
         self.done = done
         self.began = 0.0  # where time is shared
-        self.held: Any = None  # what keeps virtual time from passing until it is back
+        self.time_hold: Any = None  # what keeps virtual time from passing until it is back
         self.lane: Any = None  # the thread that does it
         self.result: Any = None
         self.error: BaseException | None = None
@@ -162,9 +162,9 @@ class Job:
         except BaseException as error:
             self.error = error
 
-    def hold(self, held: Any) -> None:
+    def keep_time(self, hold: Any) -> None:
         """This keeps virtual time from passing until it is back; None: nothing does any more."""
-        self.held = held
+        self.time_hold = hold
 
     def disown(self) -> None:
         """Nobody wants to hear of it any more."""
@@ -190,7 +190,7 @@ class ThreadGroup(Group):
     def __init__(
         self,
         name: str,
-        policy: Policy[Worker],
+        policy: Policy[RunningNode],
         clock: Callable[[], float],
         ready_groups: deque[Dispatching],
         deliver: Callable[[deque[Any]], None],
@@ -215,12 +215,12 @@ class ThreadGroup(Group):
         """See `Group`."""
         return self.running >= self.threads
 
-    def _push_next(self, worker: Worker) -> None:
+    def _push_next(self, worker: RunningNode) -> None:
         self._into[1](worker)
         if self.running < self.threads:
             self._ready_groups.append(self)
 
-    def _push(self, worker: Worker) -> None:
+    def _push(self, worker: RunningNode) -> None:
         self._into[0](worker)
         if self.running < self.threads:
             self._ready_groups.append(self)
@@ -228,7 +228,7 @@ class ThreadGroup(Group):
     def dispatch(self) -> int:
         """Let nodes start until the threads are busy; on the loop; give how many."""
         policy, moved = self.policy, 0
-        while moved < _DISPATCH_STEPS and not self.held and self.running < self.threads and len(policy):
+        while moved < _DISPATCH_STEPS and not self.paused and self.running < self.threads and len(policy):
             moved += 1
             worker = self.take()
             worker.step(worker)

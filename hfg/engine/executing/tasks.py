@@ -14,12 +14,12 @@ from typing import Any, Protocol
 
 from hfg.base.clock import current_clock, current_elapsed
 from hfg.base.logs import current_log
-from hfg.engine.executing.carrier import Carrier
-from hfg.engine.executing.code import CodeRunner, speak_for
+from hfg.engine.executing.code import CodeRunner, run_as
+from hfg.engine.executing.eager_task import EagerTask
 from hfg.engine.model import Core, Doing, Task, Tasks
 from hfg.engine.model.core import PENDING
-from hfg.engine.model.current import current_flight, current_task
-from hfg.engine.model.worker import DISABLED, ENDED, TORN_DOWN, Worker
+from hfg.engine.model.current import current_firing, current_task
+from hfg.engine.model.running_node import DISABLED, ENDED, TORN_DOWN, RunningNode
 from hfg.engine.rules import doing as do_activity
 from hfg.engine.rules import errors
 from hfg.errors import NodeError, NotRunning, UsageError
@@ -62,7 +62,7 @@ class TaskRunner:
         self.under_way: dict[Task, None] = {}
         self._problems: list[NodeError] = []
 
-    def start(self, worker: Worker, coroutine: Coroutine[Any, Any, Any], doing: Doing | None = None) -> None:
+    def start(self, worker: RunningNode, coroutine: Coroutine[Any, Any, Any], doing: Doing | None = None) -> None:
         """Run a coroutine as a child of a node, from the loop's next pass on.
 
         Args:
@@ -86,7 +86,7 @@ class TaskRunner:
             return
         if worker.tasks is None:
             worker.start_tasks(Tasks(worker))
-            self._core.upstairs.bind_ports(worker)  # what it sends is looked at from here on
+            self._core.rules.bind_ports(worker)  # what it sends is looked at from here on
         task = Task(worker, name, coroutine, doing)
         worker.tasks.begin(task)
         if doing is not None:
@@ -94,7 +94,7 @@ class TaskRunner:
         self.under_way[task] = None
         self._engine.soon(partial(self._begin, task, self._context(task)))
 
-    def _refusal(self, worker: Worker, name: str) -> Exception | None:
+    def _refusal(self, worker: RunningNode, name: str) -> Exception | None:
         call = f'"{worker.path}" cannot start_soon({name}(...))'
         if worker.group.threaded:
             return UsageError(
@@ -116,8 +116,8 @@ class TaskRunner:
         context = contextvars.copy_context() if task.doing is None else self._code.context.copy()
         for one in _OF_THE_RUN:
             context.run(one.set, self._code.context[one])
-        context.run(speak_for, task.worker)
-        context.run(current_flight.set, None)
+        context.run(run_as, task.worker)
+        context.run(current_firing.set, None)
         context.run(current_task.set, task)
         return context
 
@@ -132,13 +132,15 @@ class TaskRunner:
             self._over(task, None, None)
             return
         worker = task.worker
-        carrier = Carrier(code.loop, f"hfg {worker.path} {task.name}", code.context, context, self._engine.give_way)
-        task.be_carried(carrier)
+        eager_task = EagerTask(
+            code.loop, f"hfg {worker.path} {task.name}", code.context, context, self._engine.give_way
+        )
+        task.run_in(eager_task)
         core.current = worker
         if task.doing is not None:
             do_activity.begun(worker)
         try:
-            result = carrier.start(task.coroutine, partial(self._over, task))
+            result = eager_task.start(task.coroutine, partial(self._over, task))
         except KeyboardInterrupt:
             raise
         except BaseException as error:
@@ -162,10 +164,10 @@ class TaskRunner:
     def _end(self, task: Task, result: object, error: BaseException | None) -> None:
         worker = task.worker
         del self.under_way[task]
-        if task.carrier is None:
+        if task.eager_task is None:
             task.coroutine.close()
         else:
-            task.carrier.drop()
+            task.eager_task.drop()
         failure = None if isinstance(error, asyncio.CancelledError) else error
         if task.doing is not None:
             failure = do_activity.over(worker, task, result, error)
@@ -205,12 +207,12 @@ class TaskRunner:
         return problems
 
 
-def _not_again(worker: Worker) -> None:
+def _not_again(worker: RunningNode) -> None:
     """X1: a firing that has started a task cannot be taken back, as one that has sent a signal cannot."""
     if current_task.get() is not None:
         return
-    flight = current_flight.get()
-    if flight is not None and flight.worker is worker:
-        flight.attempts.has_triggered()
+    firing = current_firing.get()
+    if firing is not None and firing.worker is worker:
+        firing.attempts.has_triggered()
     elif worker.attempts is not None:
         worker.attempts.has_triggered()

@@ -22,14 +22,14 @@ from typing import Any
 
 from hfg.base.clock import current_clock
 
-__all__ = ["Held", "VirtualTimeLoop"]
+__all__ = ["TimeHold", "VirtualTimeLoop"]
 
 _RESOLUTION_S = 1e-9
 _DIGITS = 9  # of a second: time is counted in nanoseconds
 _POLL_EVERY = 64  # jumps without a look at real sockets and signals
 
 
-class Held:
+class TimeHold:
     """Work in flight outside the loop, for which virtual time stands still.
 
     Attributes:
@@ -124,7 +124,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
     def __init__(self) -> None:
         self._virtual_now = 0.0
         self._timer_numbers = itertools.count()
-        self._held: deque[Held] = deque()  # the engine's work in threads, in order of its beginning
+        self._held: deque[TimeHold] = deque()  # the engine's work in threads, in order of its beginning
         self._executor_jobs = 0
         self.watchers: list[Callable[[float], None]] = []
         selector = _JumpingSelector()
@@ -174,17 +174,17 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
             raise ValueError(f"time goes forward: spend() takes seconds from 0 on, got {seconds!r}")
         self._virtual_now = round(self._virtual_now + seconds, _DIGITS)
 
-    def hold(self) -> Held:
+    def hold(self) -> TimeHold:
         """Let the clock stand still until this work is back (`deliver` set, on the loop) or dropped.
 
         Results come in when nothing else is ready, and in the order in which the work was begun: so a run in virtual
         time is the same each time, however the threads race.
         """
-        held = Held()
+        held = TimeHold()
         self._held.append(held)
         return held
 
-    def drop(self, held: Held) -> None:
+    def drop(self, held: TimeHold) -> None:
         """Nobody waits for this work any more."""
         if held in self._held:
             self._held.remove(held)

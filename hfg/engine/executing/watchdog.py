@@ -12,7 +12,7 @@ import threading
 import time
 
 from hfg.base.logs import Log
-from hfg.engine.model import Core, Worker
+from hfg.engine.model import Core, RunningNode
 from hfg.graph.checks.nodes import needs_loop
 from hfg.nodetypes.node import Node
 
@@ -66,9 +66,9 @@ class Watch:
             core.flags.append("slice")
         self.slice = slice_
 
-    def _at_work(self) -> Worker | None:
+    def _at_work(self) -> RunningNode | None:
         """Whose code runs on the loop; in a fused region the line tells it."""
-        worker = self.core.current or self.core.speaker
+        worker = self.core.current or self.core.running_node
         region = worker.region if worker is not None else None
         if region is None or not region.running:
             return worker

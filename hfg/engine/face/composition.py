@@ -12,7 +12,7 @@ from hfg.engine.observing.measuring import Measuring
 from hfg.engine.observing.report import Report, edge_reports, node_reports
 from hfg.engine.observing.taps import Taps
 from hfg.engine.runtime.engine import Engine
-from hfg.engine.runtime.lifetime import Lifetime
+from hfg.engine.runtime.run_lifecycle import RunLifecycle
 from hfg.engine.runtime.settings import Settings
 from hfg.errors import HfgError, RunError
 from hfg.graph import Graph
@@ -69,10 +69,10 @@ class Composition:
         self.others = others
         self.engine = engine = Engine(flat, settings)
         self.consumers = Consumers(engine)
-        self.lifetime = Lifetime(engine, last=self._last)
+        self.run_lifecycle = RunLifecycle(engine, last=self._last)
         self.taps = Taps(engine)
         self.pausing = Pausing(engine, self.consumers)
-        self.edits = Edits(engine, self.lifetime)
+        self.edits = Edits(engine, self.run_lifecycle)
         self._measuring: Measuring | None = None
         self.outputs: dict[str, list[Any]] = {}
         self._held = False
@@ -84,17 +84,17 @@ class Composition:
 
     async def start(self) -> None:
         """Set up all nodes, in whatever process, and let them go (A10)."""
-        others, lifetime = self.others, self.lifetime
+        others, run_lifecycle = self.others, self.run_lifecycle
         if others is None:
-            await lifetime.start()
-        elif await lifetime.set_up():
+            await run_lifecycle.start()
+        elif await run_lifecycle.set_up():
             try:
                 await others.open()
             except HfgError as error:
                 self.engine.finish("failed", error)
             if self.engine.ended_how is None:
                 others.begin()
-                lifetime.begin()
+                run_lifecycle.begin()
 
     async def _last(self) -> None:
         """When all else is over."""
@@ -140,7 +140,7 @@ class Composition:
         if self._done is None:
             self._done = self.engine.loop.create_future()
             try:
-                await self.lifetime.close()
+                await self.run_lifecycle.close()
             finally:
                 self._done.set_result(None)
         elif not self._done.done():

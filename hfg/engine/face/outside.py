@@ -15,7 +15,7 @@ from typing import Any, Generic, TypeVar
 from hfg.activity.rules import asked_for
 from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.engine.executing.code import answer
-from hfg.engine.model.worker import ENDED, Worker
+from hfg.engine.model.running_node import ENDED, RunningNode
 from hfg.engine.rules.releasing import take_from_reader
 from hfg.engine.rules.sending import enqueue, put_outputs
 from hfg.engine.runtime.engine import Engine
@@ -35,7 +35,7 @@ class Feed(Generic[T]):
     threads have sent what they had begun to send, but not for END's place.
     """
 
-    def __init__(self, engine: Engine, worker: Worker, hint: object, *, end: bool) -> None:
+    def __init__(self, engine: Engine, worker: RunningNode, hint: object, *, end: bool) -> None:
         self._engine = engine
         self._worker = worker
         self._hint = hint
@@ -152,7 +152,7 @@ class Feed(Generic[T]):
 class _Waiting:
     """Somebody has a token for a feed: while there is a place for it, the graph is not quiet."""
 
-    def __init__(self, engine: Engine, feed: Worker) -> None:
+    def __init__(self, engine: Engine, feed: RunningNode) -> None:
         self._engine = engine
         self._feed = feed
         engine.senders.append(feed)
@@ -193,7 +193,7 @@ def _check_running(engine: Engine) -> None:
         raise NotRunning("the run is over: nothing can be brought into it any more")
 
 
-async def read(engine: Engine, worker: Worker) -> AsyncIterator[Any]:
+async def read(engine: Engine, worker: RunningNode) -> AsyncIterator[Any]:
     """Give out the values of a graph output, with back-pressure, until END or the end of the run (P10)."""
     if not worker.live_inputs:
         raise UsageError(f'graph output "{worker.port_name}" is not connected: nothing will come out of it')
@@ -217,11 +217,11 @@ async def read(engine: Engine, worker: Worker) -> AsyncIterator[Any]:
         engine.kick()
 
 
-def collect(engine: Engine, worker: Worker, values: list[Any]) -> None:
+def collect(engine: Engine, worker: RunningNode, values: list[Any]) -> None:
     """Read a graph output into a list, for runs that nobody reads."""
 
-    def step(worker: Worker) -> None:
-        worker.no_turn()
+    def step(worker: RunningNode) -> None:
+        worker.use_turn()
         while worker.live_inputs and not worker.inputs.missing:
             token = take_from_reader(worker)
             if type(token.value) is not Marker:
@@ -232,7 +232,7 @@ def collect(engine: Engine, worker: Worker, values: list[Any]) -> None:
 
 
 async def signal(
-    engine: Engine, worker: Worker, slot: str, value: object, activity: int | None, stamp: float | None
+    engine: Engine, worker: RunningNode, slot: str, value: object, activity: int | None, stamp: float | None
 ) -> None:
     """Bring a signal into a slot from outside, as if by an edge that is active; waits while its queue is full (F8).
 

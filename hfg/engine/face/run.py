@@ -19,7 +19,7 @@ from hfg.engine.editing.setting import set_parameter
 from hfg.engine.executing.code import answer
 from hfg.engine.face import outside
 from hfg.engine.face.composition import Composition
-from hfg.engine.model.worker import UNREADY
+from hfg.engine.model.running_node import UNREADY
 from hfg.engine.observing.consumers import Listener
 from hfg.engine.observing.glance import Glance, glance_at
 from hfg.engine.observing.recorder import RunRecording

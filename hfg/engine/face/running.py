@@ -166,9 +166,9 @@ async def _run_to_end(
 ) -> Report:
     _need_begin(begin)
     run, parts = _prepare(graph, clock, settings)
-    engine, lifetime = parts.engine, parts.lifetime
+    engine, run_lifecycle = parts.engine, parts.run_lifecycle
     if ctrl_c is not None:
-        ctrl_c.task, ctrl_c.lifetime = asyncio.current_task(), lifetime
+        ctrl_c.task, ctrl_c.run_lifecycle = asyncio.current_task(), run_lifecycle
         ctrl_c.error = lambda: engine.error
     try:
         async with watched(run, settings.watch):
@@ -185,7 +185,7 @@ async def _run_to_end(
                 await parts.start()
                 await engine.ending.wait()
             finally:
-                await lifetime.close()
+                await run_lifecycle.close()
     finally:
         level_of(graph).whole.end_run()
     parts.raise_failure()
@@ -361,7 +361,7 @@ async def _running(graph: Graph, clock: Clock | None, options: RunOptions) -> As
     except asyncio.CancelledError:
         if not guard.has_cancelled():
             engine.finish("cancelled", None)
-            parts.lifetime.hurry()
+            parts.run_lifecycle.hurry()
             raise
     finally:
         guard.end()

@@ -5,10 +5,10 @@ region, writing     one wave as one generated function; threads: as one job of a
 slots, waiting      calls of slots, and async functions that really wait
 specialise          chooses one of them for a node, or the interpreted way
 
-Only here fields of `Worker` are written from outside of it. A fast path is the worker's transitions (`begin_call`,
-`take_place`, `end_firing` ...) written out, several of them in one go and without those whose outcome is known; a call
-of each would cost what is saved. That the outcome is the same is not for the eye to see: `check_invariants` asks for it
-after every step in the tests of the semantics and in debug mode, and the oracle must give the same traces.
+Only here are fields of `RunningNode` written from outside of it. A fast path is the node's transitions (`begin_call`,
+`make_fireable`, `end_firing` ...) written out, several of them in one go and without those whose outcome is known; a
+call of each would cost what is saved. That the outcome is the same is not for the eye to see: `check_invariants` asks
+for it after every step in the tests of the semantics and in debug mode, and the oracle must give the same traces.
 """
 
 __all__: list[str] = []

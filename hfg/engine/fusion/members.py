@@ -9,13 +9,13 @@ from __future__ import annotations
 from typing import Any
 
 from hfg.engine.model.policies import Fifo
-from hfg.engine.model.worker import ENDED, Worker
+from hfg.engine.model.running_node import ENDED, RunningNode
 from hfg.ports.edges import SyncEdge
 
 __all__ = ["is_plain_and_fed", "lives_by_its_slots", "may_be_called", "may_be_inside"]
 
 
-def _is_plain(worker: Worker) -> bool:
+def _is_plain(worker: RunningNode) -> bool:
     """Its firings are calls of a function and nothing else."""
     return (
         worker.type is not None
@@ -26,14 +26,14 @@ def _is_plain(worker: Worker) -> bool:
         and not worker.group.several  # of which one wave would keep the other threads waiting
         and not (worker.group.threaded and (worker.is_async or worker.listeners))  # which is for the loop to look at
         and not (worker.options.max_duration_s or worker.gates_over or worker.ready_hook is not None)
-        and worker.flights is None
+        and worker.concurrent is None
         and worker.attempts is None
         and worker.iteration is None
         and _values_in_and_out(worker)
     )
 
 
-def _values_in_and_out(worker: Worker) -> bool:
+def _values_in_and_out(worker: RunningNode) -> bool:
     """It takes values and gives back values, and that is all that passes its ports."""
     kind = worker.type
     return (
@@ -46,7 +46,7 @@ def _values_in_and_out(worker: Worker) -> bool:
     )
 
 
-def _nobody_looks(worker: Worker) -> bool:
+def _nobody_looks(worker: RunningNode) -> bool:
     """No edit waits for it, nobody at its barriers, no breakpoint; and no tap where a wave runs in a thread.
 
     Nor does anybody look at the events of its slots, who would want to know in which call a signal was triggered: in a
@@ -54,14 +54,14 @@ def _nobody_looks(worker: Worker) -> bool:
     """
     return (
         not worker.observed
-        and worker.on_idle is None
+        and worker.idle_callbacks is None
         and worker.halt is None
         and not (worker.slot_edges and any(event.tap for event in worker.events.values()))
         and not (worker.group.threaded and any(edge.tap is not None for edges in worker.out_edges for edge in edges))
     )
 
 
-def may_be_inside(worker: Worker) -> bool:
+def may_be_inside(worker: RunningNode) -> bool:
     """Whether it may follow the head: its inputs are all fed by outputs of its own group, in the same wave (R2)."""
     return (
         not worker.is_source
@@ -70,20 +70,20 @@ def may_be_inside(worker: Worker) -> bool:
         and worker.type is not None
         and worker.type.process_kind in ("function", "async")
         and 0 < len(worker.live_inputs) == len(worker.in_edges)
-        and all(type(edge) is SyncEdge and edge.follows for edge in worker.in_edges)
+        and all(type(edge) is SyncEdge and edge.depth_first for edge in worker.in_edges)
         and not worker.paced
         and _is_plain(worker)
     )
 
 
-def may_be_called(worker: Worker) -> bool:
+def may_be_called(worker: RunningNode) -> bool:
     """Whether a slot call of it may be a member: it lives by one slot that an output of its own group feeds."""
     if len(worker.slot_edges) != 1 or not lives_by_its_slots(worker):
         return False
     edge = worker.slot_edges[0]
     return bool(
         type(edge) is SyncEdge
-        and edge.follows
+        and edge.depth_first
         and edge.handler is not None
         and not edge.while_active
         and not worker.unfit
@@ -92,23 +92,23 @@ def may_be_called(worker: Worker) -> bool:
     )
 
 
-def lives_by_its_slots(worker: Worker) -> bool:
+def lives_by_its_slots(worker: RunningNode) -> bool:
     """Its calls may go the fast path: nobody looks, and nothing depends on its activity but itself."""
     options = worker.options
     if options is None or worker.group.threaded or worker.is_source or worker.in_edges or not _may_be_fast(worker):
         return False
     held = worker.gates_over or worker.ready_hook is not None or options.max_rate_hz or options.max_duration_s
-    looked_at = worker.observed or worker.on_idle is not None or worker.scopes or worker.watched
+    looked_at = worker.observed or worker.idle_callbacks is not None or worker.scopes or worker.watched
     return bool(worker.slot_edges) and not held and not looked_at
 
 
-def _may_be_fast(worker: Worker) -> bool:
+def _may_be_fast(worker: RunningNode) -> bool:
     """Nobody looks at all that happens in the run, and no border behind each step (G4)."""
     core = worker.core
     return core.fast and not core.debug and core.trace is None and worker.within is None
 
 
-def is_plain_and_fed(worker: Worker) -> bool:
+def is_plain_and_fed(worker: RunningNode) -> bool:
     """Whether it is a source, or a function with an edge into each input that it waits for, and nobody looks."""
     if not _may_be_fast(worker):
         return False
@@ -121,6 +121,6 @@ def is_plain_and_fed(worker: Worker) -> bool:
     return bool(0 < len(worker.live_inputs) == len(worker.in_edges) and _has_all(worker))
 
 
-def _has_all(worker: Worker) -> bool:
+def _has_all(worker: RunningNode) -> bool:
     fed: set[Any] = {edge.port_name for edge in worker.live_inputs}
     return all(name in fed for name in worker.mandatory_ports)

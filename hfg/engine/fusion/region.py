@@ -29,10 +29,10 @@ from typing import Any
 
 from hfg.base.token import NO_MESSAGE, Token
 from hfg.engine.fusion.schedule import Schedule
-from hfg.engine.fusion.telling import tell_rest
+from hfg.engine.fusion.tap_writing import emit_rest
 from hfg.engine.fusion.writing import Wave, Writer, write_wave
 from hfg.engine.model.core import PENDING, Flags
-from hfg.engine.model.worker import NO_CALLS, Worker
+from hfg.engine.model.running_node import NO_CALLS, RunningNode
 from hfg.engine.rules import agenda, calls, errors, firing
 from hfg.engine.rules.releasing import release
 from hfg.errors import EngineInternalError
@@ -46,10 +46,10 @@ _MOST_EXITS = 16  # by one member, before it is asked whether they are the rule
 _LONGEST_PUT_OFF = 255  # waves for which a region that cannot be armed does not ask again
 
 
-def _rests(worker: Worker, called: bool) -> bool:
+def _rests(worker: RunningNode, called: bool) -> bool:
     """Whether nothing is under way at a member, nothing lies before it, and nothing forbids its next firing or call."""
     blocked = worker.blocked >= NO_CALLS if called else worker.blocked
-    if blocked or worker.busy or worker.placed or worker.queued or worker.calls or worker.on_idle is not None:
+    if blocked or worker.busy or worker.fireable or worker.queued or worker.calls or worker.idle_callbacks is not None:
         return False
     if worker.outputs.missing or worker.pending_end:
         return False
@@ -71,7 +71,7 @@ class Region:
       ending: some producer before the head sends END as soon as its outputs are free.
     """
 
-    def __init__(self, schedule: Schedule, respecialise: Callable[[Worker], None]) -> None:
+    def __init__(self, schedule: Schedule, respecialise: Callable[[RunningNode], None]) -> None:
         self.schedule = schedule
         self.order = order = schedule.order
         self.head = head = order[0]
@@ -81,7 +81,7 @@ class Region:
         self.held_entries = tuple(edge for edge in self.entries if type(edge) is not EventEdge and edge.sequential)
         self.inner = [edge for out in schedule.outs for edge, _, to in out if to is not None]
         self.border = [edge for out in schedule.outs for edge, _, to in out if to is None]
-        self.carriers = [worker for worker in order if any(edge.active for edge in worker.all_out_edges())]
+        self.activity_senders = [worker for worker in order if any(edge.active for edge in worker.all_out_edges())]
         self.armed = False
         self.running = False
         self.doomed = False
@@ -129,7 +129,8 @@ class Region:
             self._put_off -= 1
             return False
         called = self.schedule.called
-        rests = not self.doomed and not self.head.outputs.missing and not any(one.active for one in self.carriers)
+        rests = not self.doomed and not self.head.outputs.missing
+        rests = rests and not any(one.active for one in self.activity_senders)
         if not rests or not all(_rests(one, k in called) for k, one in enumerate(self.order) if k):
             self._put_off = self._patience
             self._patience = min(2 * self._patience + 1, _LONGEST_PUT_OFF)
@@ -152,7 +153,7 @@ class Region:
             if k and not _rests(worker, k in self.schedule.called):
                 raise EngineInternalError(f'node "{worker.path}": its region is armed, but it does not rest')
         for edge in self.inner:
-            if edge.token is not None or edge.held:
+            if edge.token is not None or edge.unprocessed:
                 raise EngineInternalError(f'edge "{edge.label}": its region is armed, but a token is on it')
         for edge in self.border:
             if edge.waits is not self.head:
@@ -167,7 +168,7 @@ class Region:
             self.settle_counts()
             self._write_barriers(len(self.order))
 
-    def disturb(self, worker: Worker) -> None:
+    def disturb(self, worker: RunningNode) -> None:
         """A member does not rest any more; of the head only its next wave asks."""
         if self.running:
             self._call_off("disturbed")
@@ -190,7 +191,7 @@ class Region:
         else:
             self.flags.append(why)
 
-    def abandon(self) -> Worker:
+    def abandon(self) -> RunningNode:
         """The wave that has given way does not come back: whose call it is in; those before it have fired."""
         if not self.amid:
             return self.head  # a wave on the loop always comes back
@@ -213,7 +214,7 @@ class Region:
             for worker in self.order:
                 self._respecialise(worker)
 
-    def decline(self, worker: Worker) -> None:
+    def decline(self, worker: RunningNode) -> None:
         """The head's next piece of work is not a plain wave."""
         self.disarm()
         firing.step(worker)
@@ -248,10 +249,10 @@ class Region:
         gave_way, called_off = bool(self.amid), self.called_off
         if gave_way:
             self._rest()
-        if core.followers:
-            self._let_follow(self.schedule.followers)
+        if core.next_in_wave:
+            self._queue_next_in_wave(self.schedule.next_in_wave)
         if head.outputs.missing or head.inputs.missing:
-            head.unplace()  # what came in while the wave ran gave it a place; F1 does not hold behind the wave
+            head.drop_firing()  # what came in while the wave ran gave it a place; F1 does not hold behind the wave
         if head.outputs.missing:
             head.hold(self.held_entries)
         elif self.held_entries:
@@ -266,7 +267,7 @@ class Region:
         else:
             agenda.consider(head)
 
-    def _let_go(self, head: Worker) -> None:
+    def _let_go(self, head: RunningNode) -> None:
         """Nothing the head has sent is waited for, so what it took is processed (F5)."""
         if len(self.order) > 1:  # those behind it freed its outputs, when its own firing was over
             agenda.consider(head)
@@ -286,18 +287,18 @@ class Region:
     def _go_by(self, wave: Wave) -> None:
         self._wave = wave
         self.step = wave.step
-        self.head.go_by(wave.step)
+        self.head.use_step(wave.step)
 
-    def _let_follow(self, candidates: Sequence[Worker]) -> None:
+    def _queue_next_in_wave(self, candidates: Sequence[RunningNode]) -> None:
         """Those outside whom the wave has enabled go next, in the order R2 prescribes."""
-        core, followers = self.core, self.core.followers
-        if len(followers) > 1:
+        core, next_in_wave = self.core, self.core.next_in_wave
+        if len(next_in_wave) > 1:
             place = {worker: number for number, worker in enumerate(candidates)}
-            followers.sort(key=place.__getitem__)
-        core.followed += len(followers)
-        for worker in reversed(followers):
+            next_in_wave.sort(key=place.__getitem__)
+        core.ran_next += len(next_in_wave)
+        for worker in reversed(next_in_wave):
             worker.push_next(worker)
-        followers.clear()
+        next_in_wave.clear()
 
     # --- side exits -------------------------------------------------------------------------------------------------
 
@@ -365,11 +366,11 @@ class Region:
             self.order[k].fit_no_more()
             self.doomed = True
 
-    def materialise(self, k: int, found: dict[str, Any]) -> Worker:
+    def materialise(self, k: int, found: dict[str, Any]) -> RunningNode:
         """Members before k have fired and k is amid its firing: let the interpreted way see it so."""
         self.waves += found["done"]
         self.settle_counts()
-        tell_rest(self._wave.untold.get(k, ()), found, self.core.now)
+        emit_rest(self._wave.untold.get(k, ()), found, self.core.now)
         self.armed = self.running = False
         stamp = found["stamp"]
         silent_calls: set[SyncEdge] = set()
@@ -386,9 +387,9 @@ class Region:
         if k in self.schedule.called:
             worker.begin_call(worker.slot_edges[0], stamp)
         else:
-            worker.be_amid_firing(worker.live_inputs if k else self.held_entries, stamp)
+            worker.resume_as_firing(worker.live_inputs if k else self.held_entries, stamp)
         self._queue_behind(k)
-        self.core.speaker = worker
+        self.core.running_node = worker
         return worker
 
     def _lay(self, edge: SyncEdge, to: int, value: object, stamp: float) -> bool:
@@ -405,7 +406,7 @@ class Region:
                 target.mark_special()
         return True
 
-    def _count(self, worker: Worker, called: bool) -> None:
+    def _count(self, worker: RunningNode, called: bool) -> None:
         """It has fired, or was called, in the wave that does not come to its end; its silence is counted already."""
         if called:
             worker.counts.add_calls(1)
@@ -416,9 +417,9 @@ class Region:
         """Who stands behind member k is enabled by now, or by an outside edge that was waited for (R2)."""
         behind = self.schedule.behind[k]
         for worker in behind:
-            if worker in self.schedule.position and (worker.calls or agenda.place(worker)):
-                worker.go_behind_wave()
-        self._let_follow(behind)
+            if worker in self.schedule.position and (worker.calls or agenda.make_fireable(worker)):
+                worker.run_after_wave()
+        self._queue_next_in_wave(behind)
 
     def _write_barriers(self, k: int, silent_calls: Collection[SyncEdge] = ()) -> None:
         """F5: who of those that have fired, the first k, still waits for what it has sent.
@@ -434,8 +435,8 @@ class Region:
             worker, missing = self.order[j], 0
             for edge, _, to in self.schedule.outs[j]:
                 if to is not None:
-                    edge.held = edge.live and (to >= k or not done[to]) and edge not in silent_calls
-                missing += edge.held
+                    edge.unprocessed = edge.live and (to >= k or not done[to]) and edge not in silent_calls
+                missing += edge.unprocessed
             worker.wait_for_taking(missing, worker.live_inputs if j else self.held_entries)
             done[j] = not missing
 
@@ -446,9 +447,9 @@ class Region:
 
         A call that really waits becomes a firing like any other; the wave's coroutine stays around it.
         """
-        carrier: Any = self._lender.execution.carrier  # type: ignore[union-attr]  # there is async code
+        eager_task: Any = self._lender.execution.eager_task  # type: ignore[union-attr]  # there is async code
         self._coroutine = waves
-        if carrier.start(waves, self._late, self._detach) is PENDING and not self.detached:
+        if eager_task.start(waves, self._late, self._detach) is PENDING and not self.detached:
             if self._may_give_way:
                 self._give_way()
             else:
@@ -463,18 +464,18 @@ class Region:
             if worker.busy != "firing":  # else its call, under way, was announced
                 worker.be_in_wave(self.amid)
         code = self.core.code
-        lender.set_out()
+        lender.begin_async()
         self._after = code.late(lender, _nothing_more)
         self.sent_on()
-        self.core.speaker = None
+        self.core.running_node = None
 
     def sent_on(self) -> None:
         """What has left the wave that gives way is on its way, and the head waits for it."""
-        if self.core.followers:
-            self._let_follow(self.schedule.followers)
-            self.core.host.kick()
+        if self.core.next_in_wave:
+            self._queue_next_in_wave(self.schedule.next_in_wave)
+            self.core.runtime.kick()
         if self.head.outputs.missing:
-            self.head.unplace()
+            self.head.drop_firing()
 
     def _detach(self) -> None:
         """The call under way waits for more than its turn: from here on it is a firing like any other."""
@@ -485,18 +486,18 @@ class Region:
         worker = self.order[k]
         gave_way = bool(self.amid)
         if gave_way:
-            lender.come_back()
+            lender.end_async()
             self._rest()
         worker.execution.exchange(lender.execution)  # whoever cancels the node means this code
         self.detached = True
         self._note_exit(k)
         self.materialise(k, found)
         code = self.core.code
-        worker.set_out()
+        worker.begin_async()
         self._after = code.late(worker, firing.when_done(worker))
         self._left(gave_way)
         if gave_way:
-            self.core.host.kick()
+            self.core.runtime.kick()
 
     def _place(self) -> tuple[int, dict[str, Any]]:
         """The member in whose call the wave waits, and what its locals hold."""
@@ -515,7 +516,7 @@ class Region:
             if (
                 len(self.order) > 1
             ):  # what came in meanwhile gave it a place, or time to start; it waits for the wave (F5)
-                self.head.unplace()
+                self.head.drop_firing()
 
     def _go_on(self, called_off: bool) -> None:
         """Those who have come to a member while it was busy have their turn."""
@@ -531,7 +532,7 @@ class Region:
 
     # --- who is at work ----------------------------------------------------------------------------------------------
 
-    def at_work(self, frame: FrameType | None) -> Worker | None:
+    def at_work(self, frame: FrameType | None) -> RunningNode | None:
         """Whose call a running wave is in, by the line it is at; None if the frames are of something else."""
         codes = [wave.code for wave in self._waves()]
         while frame is not None:
@@ -547,7 +548,7 @@ class Region:
     def _waves(self) -> list[Wave]:
         return [wave for wave in (self._plain, self._measured) if wave is not None]
 
-    def is_calling(self, worker: Worker) -> bool:
+    def is_calling(self, worker: RunningNode) -> bool:
         """Whether the call of this member is the one under way in a running wave."""
         if self.amid:  # its own tasks may ask while it waits for its turn
             frame = self._coroutine.cr_frame
@@ -555,16 +556,16 @@ class Region:
             return k is not None and self.order[k] is worker
         return self.running and self.at_work(sys._getframe(1)) is worker  # noqa: SLF001 - of frames nobody else knows
 
-    def speaks(self, worker: Worker) -> bool:
+    def is_sending(self, worker: RunningNode) -> bool:
         """A member sends by itself, which a plain call does not: whether it is the one whose call runs.
 
         It leaves the wave behind this call, and the next region says before each of its calls that it runs.
         """
         if worker.slot_edges or not self.is_calling(worker):  # (what a slot handler may not do is for others to say)
             return False
-        worker.speak_by_itself()
+        worker.mark_sends_itself()
         self.doomed = True
-        self._call_off("speaks")
+        self._call_off("sends")
         return True
 
 

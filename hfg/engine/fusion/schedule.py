@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hfg.engine.fusion.members import may_be_called, may_be_inside
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.ports.edges import BufferEdge, SyncEdge
 
 __all__ = ["MOST_MEMBERS", "Schedule", "asks_who_hears", "schedule"]
@@ -30,15 +30,17 @@ class Schedule:
         position of the member it leads to; None where it leaves the region.
       behind: per member who would stand in front of the run queue when its turn has come, the next one first.
       called: which members are slot calls, by their position; the others are firings.
-      followers: those outside who would stand there when the last member has fired.
+      next_in_wave: those outside who would stand there when the last member has fired.
     """
 
-    def __init__(self, order: list[Worker], behind: list[tuple[Worker, ...]], followers: tuple[Worker, ...]) -> None:
+    def __init__(
+        self, order: list[RunningNode], behind: list[tuple[RunningNode, ...]], next_in_wave: tuple[RunningNode, ...]
+    ) -> None:
         self.order = order
         self.position = {worker: number for number, worker in enumerate(order)}
         self.behind = behind
         self.called = frozenset(k for k, worker in enumerate(order) if worker.slot_edges)
-        self.followers = followers
+        self.next_in_wave = next_in_wave
         self.outs: list[list[tuple[Any, int, int | None]]] = [
             [(edge, output, self._inside(edge, output)) for edge, output in _sending(worker)] for worker in order
         ]
@@ -57,15 +59,15 @@ class Schedule:
 
     def _inside(self, edge: SyncEdge | BufferEdge, output: int) -> int | None:
         """Where the edge leads to, if that is a member and the edge belongs to its waves."""
-        return self.position.get(edge.target) if edge.follows and not asks_who_hears(edge.source, output) else None
+        return self.position.get(edge.target) if edge.depth_first and not asks_who_hears(edge.source, output) else None
 
 
-def asks_who_hears(worker: Worker, output: int) -> bool:
+def asks_who_hears(worker: RunningNode, output: int) -> bool:
     """Whether slots that listen only while they are active make each sending of the output another (T4)."""
     return bool(worker.listeners) and worker.listeners[output] is not None
 
 
-def schedule(head: Worker) -> Schedule | None:
+def schedule(head: RunningNode) -> Schedule | None:
     """Find the members of the region that begins with the head, and their order; None if there is no such order."""
     inside = _closure(head)
     while inside:
@@ -76,21 +78,21 @@ def schedule(head: Worker) -> Schedule | None:
     return None
 
 
-def _sending(worker: Worker) -> list[tuple[Any, int]]:
+def _sending(worker: RunningNode) -> list[tuple[Any, int]]:
     """Its live edges with the number of their output, slots first (F9)."""
     edges = [(edge, output) for output, edges in enumerate(worker.out_edges) for edge in edges]
     return sorted(edges, key=lambda one: one[0].target_kind != "slot")
 
 
-def _closure(head: Worker) -> set[Worker]:
+def _closure(head: RunningNode) -> set[RunningNode]:
     """The head and everybody whose inputs all come from here, at most `MOST_MEMBERS`."""
     inside, todo = {head}, [head]
-    missing: dict[Worker, int] = {}
+    missing: dict[RunningNode, int] = {}
     while todo and len(inside) < MOST_MEMBERS:
         worker = todo.pop()
         for edge, output in reversed(_sending(worker)):
-            target: Worker = edge.target
-            if not edge.follows or target in inside or asks_who_hears(worker, output) or _is_inside_another(target):
+            target: RunningNode = edge.target
+            if not edge.depth_first or target in inside or asks_who_hears(worker, output) or _is_inside_another(target):
                 continue
             if edge.target_kind == "slot":
                 fed = may_be_called(target)
@@ -106,21 +108,21 @@ def _closure(head: Worker) -> set[Worker]:
     return inside
 
 
-def _is_inside_another(worker: Worker) -> bool:
+def _is_inside_another(worker: RunningNode) -> bool:
     """Whether it belongs to a region that another leads."""
     return worker.region is not None and worker.region.head is not worker
 
 
-def _simulate(head: Worker, inside: set[Worker]) -> Schedule:
+def _simulate(head: RunningNode, inside: set[RunningNode]) -> Schedule:
     """Run R2 without values: a stack of those who are enabled, depth first.
 
     The region ends where somebody from outside would have to fire between two members: all that is enabled then is for
     the run queue.
     """
     left = _edges_left(inside)
-    order: list[Worker] = []
-    behind: list[tuple[Worker, ...]] = []
-    reached: dict[Worker, bool] = {}  # those outside to whom something was sent: whether that was a call
+    order: list[RunningNode] = []
+    behind: list[tuple[RunningNode, ...]] = []
+    reached: dict[RunningNode, bool] = {}  # those outside to whom something was sent: whether that was a call
     stack = [head]
     while stack:
         worker = stack.pop()
@@ -128,10 +130,10 @@ def _simulate(head: Worker, inside: set[Worker]) -> Schedule:
             return Schedule(order, behind, (worker, *reversed(stack)))
         order.append(worker)
         behind.append(tuple(reversed(stack)))
-        enabled: list[Worker] = []
+        enabled: list[RunningNode] = []
         for edge, _ in _sending(worker):
-            target: Worker = edge.target
-            if not edge.follows:
+            target: RunningNode = edge.target
+            if not edge.depth_first:
                 continue
             if edge.target_kind == "slot":
                 enabled.append(target)
@@ -143,10 +145,10 @@ def _simulate(head: Worker, inside: set[Worker]) -> Schedule:
     return Schedule(order, behind, ())
 
 
-def _depends_on_values(worker: Worker, inside: set[Worker], reached: dict[Worker, bool]) -> bool:
+def _depends_on_values(worker: RunningNode, inside: set[RunningNode], reached: dict[RunningNode, bool]) -> bool:
     """Whether the place of somebody behind it does: a call by silence never comes, another token may."""
     for edge, _ in _sending(worker):
-        if edge.follows and edge.target not in inside:
+        if edge.depth_first and edge.target not in inside:
             calls = edge.target_kind == "slot"
             if reached.get(edge.target, False) or (calls and edge.target in reached):
                 return True
@@ -154,11 +156,11 @@ def _depends_on_values(worker: Worker, inside: set[Worker], reached: dict[Worker
     return False
 
 
-def _edges_left(inside: Sequence[Worker] | set[Worker]) -> dict[Worker, int]:
+def _edges_left(inside: Sequence[RunningNode] | set[RunningNode]) -> dict[RunningNode, int]:
     """How many edges lead from members to each target: the last token of them may enable it."""
-    left: dict[Worker, int] = {}
+    left: dict[RunningNode, int] = {}
     for worker in inside:
         for edge, _ in _sending(worker):
-            if edge.follows and edge.target_kind != "slot":
+            if edge.depth_first and edge.target_kind != "slot":
                 left[edge.target] = left.get(edge.target, 0) + 1
     return left

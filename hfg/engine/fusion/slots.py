@@ -14,7 +14,7 @@ from typing import Any
 
 from hfg.base.token import Token
 from hfg.engine.model import Core, Group, RunningEvent
-from hfg.engine.model.worker import NO_CALLS, Worker
+from hfg.engine.model.running_node import NO_CALLS, RunningNode
 from hfg.engine.rules import errors, firing
 from hfg.engine.rules.agenda import add_call, freed, idle_again, note_full
 from hfg.engine.rules.calls import await_call
@@ -25,10 +25,10 @@ from hfg.ports.edges import AnyEdge, EventEdge, SyncEdge
 
 __all__ = ["calls_step", "emitter"]
 
-Step = Callable[[Worker], None]
+Step = Callable[[RunningNode], None]
 
 
-def calls_step(worker: Worker) -> Step:
+def calls_step(worker: RunningNode) -> Step:
     """The step of a node that lives by its slots."""
     general = firing.step
     calls: Any = worker.calls
@@ -36,18 +36,18 @@ def calls_step(worker: Worker) -> Step:
     if len(set(steps.values())) == 1:
         return steps.popitem()[1]
 
-    def step(worker: Worker) -> None:
+    def step(worker: RunningNode) -> None:
         if calls:
             steps[calls[0]](worker)
-            if worker.follows and not (worker.busy or worker.queued):
-                worker.follow_no_more()  # it stood in the queue for this call alone (R2)
+            if worker.is_next and not (worker.busy or worker.queued):
+                worker.clear_next()  # it stood in the queue for this call alone (R2)
         else:
             general(worker)
 
     return step
 
 
-def _call_step(worker: Worker, edge: SyncEdge | EventEdge) -> Step:
+def _call_step(worker: RunningNode, edge: SyncEdge | EventEdge) -> Step:
     """One edge into one slot, whose handler takes the value."""
     if edge.handler is None:
         return firing.step
@@ -68,9 +68,9 @@ def _signal_step(group: Group, core: Core) -> Step:
     ready, in_a_row = core.ready_groups, group.in_a_row
     amid = False  # the turn of another in a row; if it comes back here, that is one call: rows in rows have no end
 
-    def step(worker: Worker) -> None:
+    def step(worker: RunningNode) -> None:
         nonlocal amid
-        given = more = group.turns - 1 if in_a_row and not amid else 0
+        given = more = group.budget - 1 if in_a_row and not amid else 0
         own: Step = step  # who is called here goes this way, whatever else it may do in turns of its own
         try:
             while True:
@@ -93,7 +93,7 @@ def _signal_step(group: Group, core: Core) -> Step:
                         freed(edge)
                     if modifier:
                         _take_activity(worker, modifier > 0)
-                    core.speaker = worker
+                    core.running_node = worker
                     try:
                         result = handler(value)
                     except Exception as error:
@@ -101,9 +101,9 @@ def _signal_step(group: Group, core: Core) -> Step:
                     if result is not None and type(result) is CoroutineType:
                         return _waits(worker, edge, result)
                     worker.stamp = None
-                    worker.right = False
+                    worker.may_carry = False
                     worker.queued = False
-                    if calls or worker.on_idle is not None:
+                    if calls or worker.idle_callbacks is not None:
                         idle_again(worker)
                 if not more or flags or ready or not queued:
                     return None
@@ -113,13 +113,13 @@ def _signal_step(group: Group, core: Core) -> Step:
         finally:
             if given:
                 amid = False
-                group.had_turns(given - more)
+                group.spend(given - more)
 
     group.signal_step = step
     return step
 
 
-def _token_step(worker: Worker, edge: SyncEdge) -> Step:
+def _token_step(worker: RunningNode, edge: SyncEdge) -> Step:
     """A token that an output has sent is processed when the call is over, or takes it (F6)."""
     handler: Any = edge.handler
     core, general = worker.core, firing.step
@@ -129,7 +129,7 @@ def _token_step(worker: Worker, edge: SyncEdge) -> Step:
     pipelined = () if held else (edge,)
     while_active = edge.while_active
 
-    def step(worker: Worker) -> None:
+    def step(worker: RunningNode) -> None:
         if not calls or worker.blocked >= NO_CALLS or worker.busy:
             return general(worker)
         # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
@@ -141,7 +141,7 @@ def _token_step(worker: Worker, edge: SyncEdge) -> Step:
         if token.activity:
             _take_activity(worker, token.activity > 0)
         if not while_active or worker.active:  # T4: it was when the token came
-            core.speaker = worker
+            core.running_node = worker
             worker.stamp = token.stamp
             try:
                 result = handler(token.value)
@@ -150,26 +150,26 @@ def _token_step(worker: Worker, edge: SyncEdge) -> Step:
             if result is not None and type(result) is CoroutineType:
                 return _waits(worker, edge, result)
             worker.stamp = None
-            worker.right = False
+            worker.may_carry = False
         if held:
             release(held)
         worker.queued = False
-        if calls or worker.follows or worker.on_idle is not None:
+        if calls or worker.is_next or worker.idle_callbacks is not None:
             idle_again(worker)
         return None
 
     return step
 
 
-def _failed(worker: Worker, edge: AnyEdge, error: Exception) -> None:
+def _failed(worker: RunningNode, edge: AnyEdge, error: Exception) -> None:
     """The handler has raised: from here on the call is one like any other."""
-    worker.be_amid_call(edge)
+    worker.resume_as_call(edge)
     errors.fail_call(worker, edge.port_name, error)
 
 
-def _waits(worker: Worker, edge: AnyEdge, coroutine: CoroutineType[Any, Any, Any]) -> None:
+def _waits(worker: RunningNode, edge: AnyEdge, coroutine: CoroutineType[Any, Any, Any]) -> None:
     """The handler has given code that waits: from here on the call is one like any other."""
-    worker.be_amid_call(edge)
+    worker.resume_as_call(edge)
     await_call(worker, edge.port_name, coroutine)
 
 
@@ -198,7 +198,7 @@ def _may_be_short(event: RunningEvent, edge: EventEdge) -> bool:
 
 def _interpreted_emitter(event: RunningEvent) -> Callable[..., None]:
     core = event.worker.core
-    host = core.host
+    host = core.runtime
 
     def emit(value: object = None, *, activity: int | None = None, stamp: float | None = None) -> None:
         if host.on_loop():
@@ -212,9 +212,9 @@ def _interpreted_emitter(event: RunningEvent) -> Callable[..., None]:
 def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..., None]) -> Callable[..., None]:
     worker, port = event.worker, event.port
     core = worker.core
-    host = core.host
+    host = core.runtime
     watched = port._observers is not None
-    target: Worker = edge.target
+    target: RunningNode = edge.target
     queue = edge.queue
     carries = edge.active
 
@@ -222,7 +222,7 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
     def emit(value: object = None, activity: int | None = None, stamp: float | None = None) -> None:
         if (
             activity is not None
-            or core.speaker is not worker  # not out of a fast path; perhaps a thread, while the loop is at work
+            or core.running_node is not worker  # not out of a fast path; perhaps a thread, while the loop is at work
             or watched
             or not edge.live
             or type(value) is Token
@@ -234,7 +234,7 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
             if stamp is None:
                 stamp = core.now()
         edge.sent = number = edge.sent + 1
-        if carries and (worker.active or worker.right):
+        if carries and (worker.active or worker.may_carry):
             queue.append((value, 1, stamp, number))
             _give_activity(worker, target)
         else:
@@ -249,7 +249,7 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
             target.queued = True
             push = target.push
             push(target)
-        if core.speaker is not worker:  # a thread was here after all, and perhaps the loop has gone to rest
+        if core.running_node is not worker:  # a thread was here after all, and perhaps the loop has gone to rest
             host.from_any_thread(host.kick)
 
     def look() -> None:
@@ -260,19 +260,19 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
     return emit
 
 
-def _take_activity(worker: Worker, active: bool) -> None:
+def _take_activity(worker: RunningNode, active: bool) -> None:
     """A6: what the call brings acts before it; nothing depends on the activity of such a node but itself."""
     if worker.active != active:
         worker.take_activity(active)
-        if worker.core.seldom is not None:
+        if worker.core.trace_changes is not None:
             tell_activity(worker, "token")
 
 
-def _give_activity(worker: Worker, target: Worker) -> None:
+def _give_activity(worker: RunningNode, target: RunningNode) -> None:
     """A5: what carries activity takes it from the sender; it stays its right until the call is over (A3)."""
     if worker.active:
         worker.give_away_activity()
-        if worker.core.seldom is not None:
+        if worker.core.trace_changes is not None:
             tell_activity(worker, "sent")
     bring_activity(target)
     derive_scopes(worker.core)

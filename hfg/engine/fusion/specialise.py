@@ -13,25 +13,25 @@ from hfg.engine.fusion.schedule import schedule
 from hfg.engine.fusion.slots import calls_step
 from hfg.engine.fusion.threads import SOONER_IN_THREADS, ThreadRegion
 from hfg.engine.fusion.waiting import waiting_step
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.engine.rules import firing, iterating
 
 __all__ = ["specialise"]
 
-Step = Callable[[Worker], None]
+Step = Callable[[RunningNode], None]
 
 
-def specialise(worker: Worker) -> None:
+def specialise(worker: RunningNode) -> None:
     """Give the worker the shortest step that is right for its present shape, behind its breakpoint if it has one."""
     region = worker.region
     if region is not None:
         region.dissolve()  # which asks for each of its members, now or behind the call under way
         return
     step = _step_of(worker)
-    worker.go_by(step if worker.halt is None else worker.halt(step))
+    worker.use_step(step if worker.halt is None else worker.halt(step))
 
 
-def _step_of(worker: Worker) -> Step:
+def _step_of(worker: RunningNode) -> Step:
     if worker.within is not None:  # its border looks behind each step whether that was the last (G4)
         return iterating.step
     if worker.node is None and worker.process is not None:  # it takes what comes out, or lays down what comes in
@@ -46,13 +46,13 @@ def _step_of(worker: Worker) -> Step:
     return alone if worker.unfit else _until_warm(worker, alone)
 
 
-def _until_warm(worker: Worker, alone: Step) -> Step:
+def _until_warm(worker: RunningNode, alone: Step) -> Step:
     """What it does alone, until the node has fired so often that fusing pays; then a region behind it."""
     core = worker.core
     threaded = worker.group.threaded
     left = core.fuse_after // SOONER_IN_THREADS if threaded else core.fuse_after
 
-    def step(worker: Worker) -> None:
+    def step(worker: RunningNode) -> None:
         nonlocal left
         left -= 1
         if (
@@ -60,14 +60,14 @@ def _until_warm(worker: Worker, alone: Step) -> Step:
             and not worker.special
             and core.started
             and not core.over
-            and not core.held
+            and not core.paused
             and worker.region is None
         ):
             found = schedule(worker)
             if found is None or (threaded and len(found.order) == 1):  # in a thread that is one job a wave as it is
-                worker.go_by(alone)
+                worker.use_step(alone)
             else:
-                worker.go_by((ThreadRegion if threaded else Region)(found, specialise).step)
+                worker.use_step((ThreadRegion if threaded else Region)(found, specialise).step)
             worker.step(worker)
         else:
             alone(worker)
@@ -75,6 +75,6 @@ def _until_warm(worker: Worker, alone: Step) -> Step:
     return step
 
 
-def _leave_lying(worker: Worker) -> None:
+def _leave_lying(worker: RunningNode) -> None:
     """A graph output: its token lies there until somebody reads it (P10)."""
     worker.dequeued()

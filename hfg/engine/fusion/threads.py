@@ -26,9 +26,9 @@ from hfg.engine.fusion.region import Region
 from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.fusion.writing import Fusible, Wave, Writer, write_wave
 from hfg.engine.model.core import Flags
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.engine.rules import firing
-from hfg.engine.rules.agenda import consider, idle_again, let_follow
+from hfg.engine.rules.agenda import consider, idle_again, queue_next_in_wave
 from hfg.engine.rules.releasing import make_room, release
 from hfg.engine.rules.sending import put
 from hfg.ports.edges import ACTIVITY, SyncEdge
@@ -94,11 +94,11 @@ class ThreadRegion(Region):
       flags: not empty: the wave under way ends behind its present call; the thread looks at it.
     """
 
-    def __init__(self, schedule: Schedule, respecialise: Callable[[Worker], None]) -> None:
+    def __init__(self, schedule: Schedule, respecialise: Callable[[RunningNode], None]) -> None:
         self._thread: Any = None
         super().__init__(schedule, respecialise)
         self.step = self._fire
-        self._carries = self.head in self.carriers
+        self._carries = self.head in self.activity_senders
         self._speaking = [worker for worker in self.order if not worker.silent_code]
         self._seeing = [self.head, *(worker for worker in self._speaking if worker is not self.head)]
         self._over_border = [[edge for edge, _, to in out if to is None] for out in schedule.outs]
@@ -113,12 +113,12 @@ class ThreadRegion(Region):
 
     # --- a wave -----------------------------------------------------------------------------------------------------
 
-    def _fire(self, head: Worker) -> None:
+    def _fire(self, head: RunningNode) -> None:
         """Take the tokens and let the thread go on from there."""
         if not self._may_begin():
             self.decline(head)
             return
-        head.no_turn()
+        head.use_turn()
         arguments: list[Any] = list(head.unset)
         tokens = [(edge, firing.take(edge)) for edge in self.entries]
         for edge, token in tokens:
@@ -140,7 +140,7 @@ class ThreadRegion(Region):
     def _may_begin(self) -> bool:
         """Whether the head's next piece of work is a plain wave."""
         head = self.head
-        if head.special or head.busy or not head.placed or (self._carries and head.active):
+        if head.special or head.busy or not head.fireable or (self._carries and head.active):
             return False
         plain = self._source_is_open() if head.is_source else self._all_plain()
         return plain and (self.armed or self.arm())
@@ -163,13 +163,13 @@ class ThreadRegion(Region):
     def put_border(self, k: int, stamp: float, values: tuple[Any, ...]) -> None:
         """What member k has sent over the border is on its way, if that is still there."""
         core = self.core
-        since = len(core.followers)
+        since = len(core.next_in_wave)
         for edge, value in zip(self._over_border[k], values, strict=True):
             if edge.live:
                 put(edge, NO_MESSAGE if value is None else value, 0, stamp)
-        let_follow(core, since)
+        queue_next_in_wave(core, since)
         if self.head.outputs.missing:
-            self.head.unplace()
+            self.head.drop_firing()
 
     def _back(self, outcome: int | _Left, error: BaseException | None) -> None:
         """The wave is over, or has ended behind one of its calls; on the loop."""
@@ -207,12 +207,12 @@ class ThreadRegion(Region):
         self.running = False
         self.waves += done
         if head.outputs.missing:
-            head.unplace()
+            head.drop_firing()
             head.hold(self.held_entries)
         elif self.held_entries:
             if not self.flags:  # those behind it free its outputs, and by that it lets go of what it took
                 head.rest()
-                if head.placed:
+                if head.fireable:
                     head.enqueue()
                 else:
                     consider(head)
@@ -245,16 +245,16 @@ class ThreadRegion(Region):
         head.rest()
         worker = self.materialise(k, left.found)
         if head.outputs.missing:
-            head.unplace()
+            head.drop_firing()
         firing.when_done(worker)(left.result, error)
         self._end()
         if worker is not head and not head.busy:
             idle_again(head)
 
     @override
-    def materialise(self, k: int, found: dict[str, Any]) -> Worker:
+    def materialise(self, k: int, found: dict[str, Any]) -> RunningNode:
         worker = super().materialise(k, found)
-        self.core.speaker = None  # nobody's code runs on the loop
+        self.core.running_node = None  # nobody's code runs on the loop
         return worker
 
     def _too_late(self, outcome: int | _Left) -> None:
@@ -272,12 +272,12 @@ class ThreadRegion(Region):
         self._measuring = self._measured is not None
 
     @override
-    def speaks(self, worker: Worker) -> bool:
+    def is_sending(self, worker: RunningNode) -> bool:
         """What is sent amid a wave finds its worker busy; so this is none of it."""
         return False
 
     @override
-    def abandon(self) -> Worker:
+    def abandon(self) -> RunningNode:
         """The wave under way does not come back: whose call it is in; those before it have fired."""
         group: Any = self.head.group
         frame = self._frame(sys._current_frames().get(group.thread_id()))  # noqa: SLF001 - as above: of frames
@@ -302,7 +302,7 @@ class _ThreadWriter(Writer):
         self.loops = self.real and self.is_source and not self.head.paced and not self.has_border
 
     @override
-    def _speaks(self, worker: Worker) -> bool:
+    def _sends_itself(self, worker: RunningNode) -> bool:
         return not worker.silent_code  # all members are busy, so its code may send: look whether it has
 
     @override

@@ -10,17 +10,17 @@ from collections.abc import Callable
 from typing import Any
 
 from hfg.engine.model.core import PENDING
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.engine.rules import firing
 from hfg.engine.rules.releasing import release
 from hfg.ports.edges import SyncEdge
 
 __all__ = ["waiting_step"]
 
-Step = Callable[[Worker], None]
+Step = Callable[[RunningNode], None]
 
 
-def waiting_step(worker: Worker) -> Step:
+def waiting_step(worker: RunningNode) -> Step:
     """The step of an async function whose inputs are all fed by outputs; else the interpreted one."""
     edges = worker.live_inputs
     kind = worker.type
@@ -42,9 +42,9 @@ def waiting_step(worker: Worker) -> Step:
         else:
             firing.when_done(worker)(result, error)
 
-    def step(worker: Worker) -> None:
+    def step(worker: RunningNode) -> None:
         nonlocal lent, late
-        if worker.special or not worker.placed or inputs.missing or worker.busy:
+        if worker.special or not worker.fireable or inputs.missing or worker.busy:
             firing.step(worker)
             return
         stamp = -1.0
@@ -63,17 +63,17 @@ def waiting_step(worker: Worker) -> Step:
         worker.fire_plainly(held, stamp)
         if pipelined:
             release(pipelined)
-        carrier = worker.execution.carrier
-        if carrier is not lent:
-            lent, late = carrier, code.late(worker, leave)
-        core.speaker = worker
+        eager_task = worker.execution.eager_task
+        if eager_task is not lent:
+            lent, late = eager_task, code.late(worker, leave)
+        core.running_node = worker
         try:
-            result = carrier.start(process(*arguments), late)
+            result = eager_task.start(process(*arguments), late)
         except Exception as error:
             leave(None, error)
             return
         if result is PENDING:
-            worker.set_out()
+            worker.begin_async()
         else:
             leave(result, None)
 

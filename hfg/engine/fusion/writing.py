@@ -22,8 +22,8 @@ from typing import Any, NamedTuple, Protocol
 
 from hfg.base.token import NO_MESSAGE, Token
 from hfg.engine.fusion.schedule import Schedule, asks_who_hears
-from hfg.engine.fusion.telling import Passed, Telling
-from hfg.engine.model import Core, Worker
+from hfg.engine.fusion.tap_writing import Passed, TapWriter
+from hfg.engine.model import Core, RunningNode
 from hfg.engine.model.core import Flags
 from hfg.engine.rules.firing import take
 from hfg.engine.rules.releasing import make_room, release
@@ -43,16 +43,16 @@ _shown: dict[str, None] = {}  # names of the newest sources that linecache knows
 class Fusible(Protocol):
     """What is to be known of a region before the text of its wave is written; see `region.Region`."""
 
-    order: list[Worker]
+    order: list[RunningNode]
     schedule: Schedule
     entries: tuple[Any, ...]
     border: list[Any]
-    carriers: list[Worker]
+    activity_senders: list[RunningNode]
     core: Core
     flags: Flags
 
     @property
-    def head(self) -> Worker:
+    def head(self) -> RunningNode:
         """Whose step runs the wave."""
 
 
@@ -66,7 +66,7 @@ class Wave(NamedTuple):
       untold: what has passed before the call of each member, and who looks was not told yet.
     """
 
-    step: Callable[[Worker], None]
+    step: Callable[[RunningNode], None]
     calls: dict[int, int]
     code: CodeType
     untold: dict[int, list[Passed]]
@@ -86,16 +86,16 @@ def write_wave(region: Fusible, writer: Writer, *, to: Any = None) -> Wave:
     _show(name, text, writer.calls, [worker.path for worker in region.order])
     names: dict[str, Any] = {}
     exec(_renamed(_compiled(text), name), names)
-    bound = names["build"](to or region, _Names(region, measured, writer.telling), *_TOOLS)
-    return Wave(bound[0], writer.calls, bound[1].__code__, writer.telling.untold)
+    bound = names["build"](to or region, _Names(region, measured, writer.taps), *_TOOLS)
+    return Wave(bound[0], writer.calls, bound[1].__code__, writer.taps.untold)
 
 
 class _Names:
     """What the text of a wave takes from its region, by the number of the member."""
 
-    def __init__(self, region: Fusible, measured: bool, telling: Telling) -> None:
+    def __init__(self, region: Fusible, measured: bool, taps: TapWriter) -> None:
         core = region.core
-        host: Any = core.host
+        host: Any = core.runtime
         order = region.order
         self.core = core
         self.head = region.head
@@ -109,14 +109,14 @@ class _Names:
         self.calls = [_code_of(worker) for worker in order]
         self.unset = [worker.unset for worker in order]
         self.edges = [[edge for edge, _, _ in out] for out in region.schedule.outs]
-        self.looks = telling.looks
-        self.together = telling.together
+        self.looks = taps.looks
+        self.batch = taps.batch
         self.listeners = [worker.listeners for worker in order]
         self.took = [worker.meter.took if measured else None for worker in order]
         self.splits = [worker.node._split for worker in order]
 
 
-def _code_of(worker: Worker) -> Any:
+def _code_of(worker: RunningNode) -> Any:
     """What a call of the member runs; who measures wraps handlers, and measures functions by the wave."""
     if worker.slot_edges:
         return worker.slot_edges[0].handler
@@ -200,15 +200,15 @@ class Writer:
         self.is_source = self.head.is_source
         self.is_generator = self.is_source and self.head.type.process_kind == "generator"
         self.has_border = bool(region.border)
-        self.carries = self.head in region.carriers
+        self.carries = self.head in region.activity_senders
         self.is_async = any(worker.is_async for worker in self.order)
-        host: Any = region.core.host
+        host: Any = region.core.runtime
         self.real = host.epoch is not None  # time goes on while code runs
         self.loops = self.real and not self.head.paced and (self.is_source or self._one_queue())
         self.called = region.schedule.called
         self.single = [self._is_single(worker) for worker in self.order]
         self.over_if_silent: set[int] = set()  # behind whose silence no code of the wave runs
-        self.telling = Telling(self.outs, self.say, real=self.real)
+        self.taps = TapWriter(self.outs, self.say, real=self.real)
         self.forgets = bool(self._kinds()) and not self.is_async  # who gives way is not the one that was entered last
         self.lines: list[str] = []
         self.calls: dict[int, int] = {}
@@ -217,14 +217,14 @@ class Writer:
     def _one_queue(self) -> bool:
         return len(self.entries) == 1 and type(self.entries[0]) is EventEdge
 
-    def _is_single(self, worker: Worker) -> bool:
+    def _is_single(self, worker: RunningNode) -> bool:
         """What it gives back is the value of its one output, or nothing."""
-        return not worker.slot_edges and not self._speaks(worker) and worker.type.result in ("none", "single")
+        return not worker.slot_edges and not self._sends_itself(worker) and worker.type.result in ("none", "single")
 
-    def _speaks(self, worker: Worker) -> bool:
+    def _sends_itself(self, worker: RunningNode) -> bool:
         """Whether its code triggers or sends by itself, so that the worker has to say that it runs."""
         kind = worker.type
-        return worker.speaks or (not worker.silent_code and (bool(kind.events) or kind.result == "fields"))
+        return worker.sends_itself or (not worker.silent_code and (bool(kind.events) or kind.result == "fields"))
 
     def say(self, text: str, call: int | None = None) -> None:
         """Write a line; `call`: the member whose code it calls."""
@@ -267,7 +267,7 @@ class Writer:
                 say(f"pipelined{number} = (entry{number},)")
         for k in range(len(self.order)):
             self._bindings_of(k)
-        self.telling.bind()
+        self.taps.bind()
         kinds = self._kinds()
         if kinds:
             say(" = ".join([*kinds, "None"]))  # the types of the last results
@@ -281,7 +281,7 @@ class Writer:
         say, worker = self.say, self.order[k]
         if k or not self.is_generator:
             say(f"f{k} = names.calls[{k}]")
-        if self._speaks(worker) or k in self.called:
+        if self._sends_itself(worker) or k in self.called:
             say(f"w{k} = names.workers[{k}]")
         elif not self.single[k]:
             say(f"split{k} = names.splits[{k}]")
@@ -318,7 +318,7 @@ class Writer:
         self.indent = 2
         if not self.is_async:
             self._nonlocal()
-        odd = ["worker.special", "worker.busy", "not worker.placed"]
+        odd = ["worker.special", "worker.busy", "not worker.fireable"]
         odd += ["worker.active"] if self.carries else []
         if self.is_generator:
             odd.append("worker.execution.generator is None")
@@ -330,10 +330,10 @@ class Writer:
             else:
                 odd += [f"not entry{number}.live", f"entry{number}.queue[0][{ACTIVITY}]"]
         say(f"if {' or '.join(odd)} or not (region.armed or region.arm()): return region.decline(worker)")
-        say("worker.queued = worker.placed = False")
+        say("worker.queued = worker.fireable = False")
         say("region.running = True")
         self._register()
-        say("core.speaker = worker")
+        say("core.running_node = worker")
         if self.head.paced:
             say("worker.rate.start(now(), worker.options.max_rate_hz)")
         if self.is_async:
@@ -388,8 +388,8 @@ class Writer:
 
     def _member(self, k: int) -> None:
         """One member: silent if what it needs is (F4), else a call."""
-        if k in self.called or self.order[k].is_async or self._speaks(self.order[k]):
-            self.telling.tell()  # its code may send something itself, or others may have a turn
+        if k in self.called or self.order[k].is_async or self._sends_itself(self.order[k]):
+            self.taps.emit()  # its code may send something itself, or others may have a turn
         if k in self.called:
             self._slot_call(k)
             return
@@ -407,7 +407,7 @@ class Writer:
         if not silence:
             self._call(k, call)
             return
-        told = self.telling.branch()
+        told = self.taps.branch()
         say(f"if {silence}:")
         self.indent += 1
         outputs = [f"v{k}_{output}" for output in range(max(1, len(worker.out_names)))]
@@ -415,7 +415,7 @@ class Writer:
         say(f"silent[{k}] += 1")
         self._put(k)
         self.indent -= 1
-        self.telling.other_branch(told)
+        self.taps.other_branch(told)
         say("else:")
         self.indent += 1
         self._call(k, call, within=True)
@@ -426,10 +426,10 @@ class Writer:
         say, value = self.say, self.schedule.local(self.order[k].slot_edges[0])
         say(f"if {value} is not None:")
         self.indent += 1
-        say(f"core.speaker = w{k}; w{k}.busy = 'call'; w{k}.stamp = stamp")
+        say(f"core.running_node = w{k}; w{k}.busy = 'call'; w{k}.stamp = stamp")
         say(f"r{k} = f{k}({value})", k)
         say(f"w{k}.busy = {self._amid()}; w{k}.stamp = None")
-        unusual = f"flags{self._unusual()} or type(r{k}) in EXCEPTIONAL or w{k}.right or w{k}.events_due"
+        unusual = f"flags{self._unusual()} or type(r{k}) in EXCEPTIONAL or w{k}.may_carry or w{k}.events_due"
         say(f"if {unusual}: return region.leave({k}, locals())")
         self.indent -= 1
         say(f"else: silent[{k}] += 1")
@@ -454,14 +454,14 @@ class Writer:
             fed = self.order[t].slot_edges or [edge for edge in self.order[t].live_inputs if edge.mandatory]
             if any(self.position[edge.source] in silent for edge in fed):
                 silent.add(t)
-        seen = self.telling.anybody_behind(k) or any(to is None for out in self.outs[k:] for _, _, to in out)
+        seen = self.taps.anybody_behind(k) or any(to is None for out in self.outs[k:] for _, _, to in out)
         return len(silent) == len(self.order) - k and not seen
 
     def _call(self, k: int, call: str, *, within: bool = False) -> None:
         """Call a member, look at what it gives back, and let that leave."""
         worker = self.order[k]
-        self.telling.before_call(k)
-        if self._speaks(worker):
+        self.taps.before_call(k)
+        if self._sends_itself(worker):
             self._announce(k)
         if self.measured:
             self.say("began = monotonic()")
@@ -484,7 +484,7 @@ class Writer:
 
     def _announce(self, k: int) -> None:
         """What the member's code sends by itself is to find that the worker runs."""
-        self.say(f"core.speaker = w{k}; w{k}.busy = 'firing'; w{k}.stamp = stamp")
+        self.say(f"core.running_node = w{k}; w{k}.busy = 'firing'; w{k}.stamp = stamp")
 
     def _unusual(self) -> str:
         return " or region.detached or region.called_off" if self.is_async else ""
@@ -505,22 +505,22 @@ class Writer:
             say("else:")
             self.indent += 1
             say(f"spread[{k}] += 1")
-            told = self.telling.branch()
+            told = self.taps.branch()
             if self.loops:
                 self._end_of_wave()
                 say("continue")
             else:
-                self.telling.tell()
+                self.taps.emit()
                 say("return region.over(1)")
-            self.telling.other_branch(told)
+            self.taps.other_branch(told)
             self.indent -= 1
         self.indent -= 1
 
     def _spread_out(self, k: int) -> None:
         """Several outputs, or sent by the code itself."""
         say, worker = self.say, self.order[k]
-        if self._speaks(worker):
-            say(f"if flags or w{k}.right{self._unusual()}: return region.leave({k}, locals())")
+        if self._sends_itself(worker):
+            say(f"if flags or w{k}.may_carry{self._unusual()}: return region.leave({k}, locals())")
         else:
             say(f"if flags{self._unusual()}: return region.leave({k}, locals())")
         if worker.out_names:
@@ -528,7 +528,7 @@ class Writer:
             say(f"if values is None: return region.leave({k}, locals())")
         else:
             say(f"if r{k} is not None: return region.leave({k}, locals())")
-        if self._speaks(worker):
+        if self._sends_itself(worker):
             say(f"w{k}.busy = {self._amid()}; w{k}.stamp = None")
         for output in range(len(worker.out_names)):
             say(f"v{k}_{output} = values[{output}]")
@@ -541,21 +541,21 @@ class Writer:
             if asks_who_hears(self.order[k], output):
                 if output not in heard:
                     heard.add(output)
-                    self.telling.tell()
+                    self.taps.emit()
                     self.say(f"put_heard(heard{k}_{output}, NO_MESSAGE if {value} is None else {value}, stamp)")
             elif to is None:
                 if edge.tap is not None:
-                    self.telling.tell()
+                    self.taps.emit()
                 self.say(f"put(e{k}_{number}, NO_MESSAGE if {value} is None else {value}, 0, stamp)")
             else:
-                self.telling.passed(k, number, output)
+                self.taps.passed(k, number, output)
         if self.is_async and (heard or any(to is None for _, _, to in self.outs[k])):
             self.say("if region.amid: region.sent_on()")
 
     def _end_of_wave(self) -> None:
         """Is there another wave at once? Only if nobody else waits for the group: waves are first in, first out."""
         say = self.say
-        self.telling.tell()
+        self.taps.emit()
         say("done += 1")
         if not self.loops:
             return
@@ -564,7 +564,7 @@ class Writer:
         if not self.is_source:
             stop += ["inputs.missing", "worker.special", f"entry0.queue[0][{ACTIVITY}]", "now() > core.until"]
         if self.has_border:
-            stop += ["outputs.missing", "core.followers"]  # whom a buffer has enabled goes before the next wave (R2)
+            stop += ["outputs.missing", "core.next_in_wave"]  # whom a buffer has enabled goes before the next wave (R2)
         say(f"if {' or '.join(stop)}: break")
 
     def _may_go_on_at_once(self) -> bool:
@@ -575,11 +575,11 @@ class Writer:
     def _go_on_at_once(self) -> None:
         """Where nothing unusual has come the source has its next turn: what `over` would find, without a call."""
         say = self.say
-        say("if not (flags or worker.blocked or worker.placed or region.doomed or core.followers):")
+        say("if not (flags or worker.blocked or worker.fireable or region.doomed or core.next_in_wave):")
         self.indent += 1
         say("region.running = False")
         say("region.waves += done")
-        say("worker.placed = worker.queued = True")
+        say("worker.fireable = worker.queued = True")
         say("push = worker.push")
         say("return push(worker)")
         self.indent -= 1

@@ -1,4 +1,4 @@
-"""What the model asks of a node below the class of nodes, which is `worker.Worker`; and what a timer is.
+"""What the model asks of a node below the class of nodes, which is `worker.RunningNode`; and what a timer is.
 
 A run is a web: a node knows its group, its subgraphs and the run, and each of these knows its nodes. Imports go one way
 all the same, since what stands below the class of nodes is generic in it: `NodeT`. `hfg.engine.model` gives the names
@@ -35,9 +35,9 @@ class _Counts(Protocol):
     @property
     def suspects(self) -> dict[Any, None]: ...
 
-    def set_out(self) -> None: ...
+    def begin_async(self) -> None: ...
 
-    def come_back(self) -> None: ...
+    def end_async(self) -> None: ...
 
 
 class _Watched(Protocol):

@@ -1,6 +1,6 @@
 """The state of one run, shared by the modules that decide over it.
 
-The rules decide over it and never wait: time, threads and coroutines are behind `Host` and `Code`, which are
+The rules decide over it and never wait: time, threads and coroutines are behind `Runtime` and `Code`, which are
 implemented where asyncio begins. It stands below the class of nodes, and so is generic in it.
 """
 
@@ -15,9 +15,9 @@ from typing import Any, Final, Generic, Literal, Protocol
 from typing_extensions import override
 
 from hfg.base.token import Token
+from hfg.engine.model.concurrent import ConcurrentFiring
 from hfg.engine.model.contracts import NodeT, Timer
 from hfg.engine.model.events import RunningEvent
-from hfg.engine.model.flights import Flight
 from hfg.engine.model.iteration import Iteration
 from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.tasks import Doing
@@ -26,7 +26,7 @@ from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.ports.events import EventPort
 from hfg.trace import TraceEvent
 
-__all__ = ["PENDING", "Code", "Core", "Flags", "Host", "Region", "Upstairs"]
+__all__ = ["PENDING", "Code", "Core", "Flags", "FusedRegion", "RuleCallbacks", "Runtime"]
 
 
 class _Pending:
@@ -34,7 +34,7 @@ class _Pending:
         return "PENDING"
 
 
-_FOR_A_WAVE: Final = frozenset({"disturbed", "dissolved", "speaks"})
+_FOR_A_WAVE: Final = frozenset({"disturbed", "dissolved", "sends"})
 """Flags that end the wave under way and nothing else."""
 
 
@@ -74,7 +74,7 @@ PENDING = _Pending()
 """What an executor returns for code that waits: its result comes later."""
 
 
-class Region(Protocol[NodeT]):
+class FusedRegion(Protocol[NodeT]):
     """Nodes whose firings are fused (see the wing `fusion`), as those below know it."""
 
     head: NodeT
@@ -90,7 +90,7 @@ class Region(Protocol[NodeT]):
     def disturb(self, worker: NodeT) -> None:
         """A member does not rest any more: the interpreted way goes on from here."""
 
-    def speaks(self, worker: NodeT) -> bool:
+    def is_sending(self, worker: NodeT) -> bool:
         """A member's code sends by itself: whether a fused call of it is under way."""
 
     def interrupt(self) -> None:
@@ -115,7 +115,7 @@ class Region(Protocol[NodeT]):
         """Let each member's barriers say what it waits for."""
 
 
-class Host(Protocol[NodeT]):
+class Runtime(Protocol[NodeT]):
     """What the deciding part of the engine needs from the waiting part."""
 
     def now(self) -> float:
@@ -173,7 +173,7 @@ class Code(Protocol[NodeT]):
     ) -> None:
         """Run code of several nodes of a thread group, one after the other; `done` follows even if the run is over."""
 
-    def execute_aside(
+    def execute_hook(
         self, worker: NodeT, call: Callable[..., Any], done: Callable[[Any, BaseException | None], None]
     ) -> None:
         """Run a hook of activity beside whatever the worker is doing."""
@@ -188,24 +188,24 @@ class Code(Protocol[NodeT]):
     ) -> Callable[[Any, BaseException | None], None]:
         """What to call when code that waited is over."""
 
-    def execute_beside(
+    def execute_concurrent(
         self,
-        flight: Flight[NodeT],
+        firing: ConcurrentFiring[NodeT],
         call: Callable[..., Any],
         arguments: tuple[Any, ...],
         done: Callable[[Any, BaseException | None], None],
     ) -> None:
         """Run the code of one of several firings of a node (F14); `done` follows, at once or later on the loop."""
 
-    def drive_beside(
+    def drive_concurrent(
         self,
-        flight: Flight[NodeT],
+        firing: ConcurrentFiring[NodeT],
         coroutine: Coroutine[Any, Any, Any],
         done: Callable[[Any, BaseException | None], None],
     ) -> None:
         """Take a coroutine of the firing's code to its end."""
 
-    def interrupt_beside(self, flight: Flight[NodeT]) -> None:
+    def interrupt_concurrent(self, firing: ConcurrentFiring[NodeT]) -> None:
         """Cancel or abandon the code of the firing (X2)."""
 
     def interrupt(self, worker: NodeT) -> None:
@@ -217,7 +217,7 @@ class Code(Protocol[NodeT]):
         """Trigger an event, then wait until no `wait` queue behind the events of its node is full (F8)."""
 
 
-class Upstairs(Protocol[NodeT]):
+class RuleCallbacks(Protocol[NodeT]):
     """What modules further up do when those below come to it, so that imports go down only."""
 
     def idle_again(self, worker: NodeT) -> None:
@@ -243,12 +243,12 @@ class Upstairs(Protocol[NodeT]):
     def operator_failed(self, edge: EventEdge, error: BaseException) -> None:
         """An operator on an edge raised."""
 
-    def begin_beside(
+    def begin_concurrent(
         self, worker: NodeT, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
     ) -> None:
         """F14: a firing that has taken its tokens goes on beside others; `refused`: it fails (P8)."""
 
-    def land(self, worker: NodeT) -> None:
+    def complete_firings(self, worker: NodeT) -> None:
         """F14: the outputs are free: firings that are over may leave."""
 
     def send_end(self, worker: NodeT) -> None:
@@ -269,7 +269,7 @@ class Upstairs(Protocol[NodeT]):
     def rewire(self, worker: NodeT) -> None:
         """What a worker waits for has changed."""
 
-    def choose_step(self, worker: NodeT) -> None:
+    def specialise(self, worker: NodeT) -> None:
         """The wiring of a worker has changed: its shortest way may be another."""
 
     def bind_ports(self, worker: NodeT) -> None:
@@ -283,11 +283,11 @@ class Core(Generic[NodeT]):
     """One run.
 
     Attributes:
-      host: the waiting part of the engine.
-      code: what runs the nodes' code; given by the host.
+      runtime: the waiting part of the engine.
+      code: what runs the nodes' code; given by the runtime.
       trace: receives every event of the run, or None: nobody listens and nothing is built (R7).
-      seldom: receives what has to do with no single token or firing: changes of activity, parameters, structure; also
-        for those who want no more than that, and so keep nobody from the fast paths.
+      trace_changes: receives what has to do with no single token or firing: changes of activity, parameters, structure;
+        also for those who want no more than that, and so keep nobody from the fast paths.
       in_flight: firings, calls and hooks that wait or run in a thread.
       tasks: that nodes have started beside these; a pause does not wait for them, quiet does.
       timers: pending calls that could start something.
@@ -295,13 +295,13 @@ class Core(Generic[NodeT]):
       current: the worker whose code runs on the loop, for the watchdog.
     """
 
-    def __init__(self, host: Host[NodeT], upstairs: Upstairs[NodeT]) -> None:
-        self.host = host
+    def __init__(self, runtime: Runtime[NodeT], rules: RuleCallbacks[NodeT]) -> None:
+        self.runtime = runtime
         self.code: Code[NodeT]
-        self.upstairs = upstairs
-        self.now = host.now
+        self.rules = rules
+        self.now = runtime.now
         self.trace: Callable[[TraceEvent], None] | None = None
-        self.seldom: Callable[[TraceEvent], None] | None = None
+        self.trace_changes: Callable[[TraceEvent], None] | None = None
         self.debug = False
         self.sharing: Any = None  # in debug mode: who uses which values (T1)
         self.fast = True
@@ -310,7 +310,7 @@ class Core(Generic[NodeT]):
         self.started = False
         self.over = False
         self.recall: Callable[[NodeT], None] | None = None  # gives a node back the state that was kept of it
-        self.held = False  # the run is paused: nodes move one by one
+        self.paused = False  # the run is paused: nodes move one by one
         self.errors: list[HfgError] = []
         self.overgrown: list[EventEdge] = []  # queues that F8 has enlarged so often that their ring is reported
         self.lost_activity = 0
@@ -338,7 +338,7 @@ class Core(Generic[NodeT]):
         self.outside: dict[tuple[int, str], Any] = {}  # edges by which signals come from outside the graph
         self.observables: list[tuple[Any, Any, tuple[Any, ...]]] = []  # outside sources of edges
         self.listeners: dict[Any, None] = {}  # outputs to slots, perhaps ahead of the edges' counts
-        self.regions: set[Region[NodeT]] = set()  # fused, and perhaps ahead of the counts of their members
+        self.regions: set[FusedRegion[NodeT]] = set()  # fused, and perhaps ahead of the counts of their members
 
     def _has_nothing_under_way(self) -> None:
         self.in_flight = 0
@@ -354,17 +354,19 @@ class Core(Generic[NodeT]):
         self.until = 0.0  # on the run's clock: the pump's slice is over
         self.ready_groups: deque[Any] = deque()  # those beside the loop's own in which something can move
         self.flags = Flags()  # of the pump and of the waves on the loop; not empty: these end behind the call under way
-        self.futile: set[NodeT] = set()  # sources that feed only ended nodes (R5)
+        self.dead_sources: set[NodeT] = set()  # sources that feed only ended nodes (R5)
         self.current: NodeT | None = None
-        self.speaker: NodeT | None = None  # whose code a fast path runs: what it triggers may take one too
-        self.holding: Any = None  # what holds nodes for an edit (R4)
-        self.followers: list[NodeT] = []  # enabled by the sending under way, and to go next (R2)
-        self.followed = 0  # how many have gone so; the pump counts waves, not hops, where time is virtual
+        self.running_node: NodeT | None = None  # whose code a fast path runs: what it triggers may take one too
+        self.quiescing: Any = None  # what holds nodes for an edit (R4)
+        self.next_in_wave: list[NodeT] = []  # enabled by the sending under way, and to go next (R2)
+        self.ran_next = 0  # how many have gone so; the pump counts waves, not hops, where time is virtual
         self.dirty_scopes: list[Scope[NodeT]] = []
-        self.late: list[NodeT] | None = None  # those whose automatic events are told behind the change under way
+        self.deferred_events: list[NodeT] | None = (
+            None  # those whose automatic events are told behind the change under way
+        )
         self.returned: list[EventEdge] = []  # whose +1 of the sending under way goes back to the sender (F13, A8)
-        self.heard: deque[tuple[Any, Token[Any]]] = deque()  # signals of which subscribers are to hear (F3)
-        self.telling = False  # they are hearing
+        self.to_notify: deque[tuple[Any, Token[Any]]] = deque()  # signals of which subscribers are to hear (F3)
+        self.notifying = False  # they are hearing
         self.drained: list[tuple[NodeT, int]] = []  # modifiers of the sending under way that act behind it (T4, F12)
 
     def ends_slice(self) -> bool:
@@ -388,17 +390,17 @@ class Core(Generic[NodeT]):
         """F8: who may wait for whom is not as it was, so any node that a full queue holds back may be in a ring now."""
         self.all_suspect = True
 
-    def hold(self, held: bool) -> None:
+    def pause(self, paused: bool) -> None:
         """R3: whether the run is paused, and nodes move one by one; a wave under way ends behind its present call."""
-        self.held = held
-        for region in self.regions if held else ():
+        self.paused = paused
+        for region in self.regions if paused else ():
             region.interrupt()
 
-    def set_out(self) -> None:
+    def begin_async(self) -> None:
         """Code waits, or runs in a thread: the run is not quiet before it has come back."""
         self.in_flight += 1
 
-    def come_back(self) -> None:
+    def end_async(self) -> None:
         """It is over, or given up."""
         self.in_flight -= 1
 
@@ -408,4 +410,4 @@ class Core(Generic[NodeT]):
 
     def after(self, delay_s: float, callback: Callable[[], None]) -> Timer:
         """Call back `delay_s` seconds from now."""
-        return self.host.call_at(self.now() + delay_s, callback)
+        return self.runtime.call_at(self.now() + delay_s, callback)

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from contextvars import ContextVar
 
-from hfg.engine.model.flights import Flight
+from hfg.engine.model.concurrent import ConcurrentFiring
+from hfg.engine.model.running_node import RunningNode
 from hfg.engine.model.tasks import Task
-from hfg.engine.model.worker import Worker
 
-__all__ = ["current_flight", "current_task"]
+__all__ = ["current_firing", "current_task"]
 
-current_flight: ContextVar[Flight[Worker] | None] = ContextVar("hfg.flight", default=None)
+current_firing: ContextVar[ConcurrentFiring[RunningNode] | None] = ContextVar("hfg.firing", default=None)
 """Whose code runs: set around the code of each firing that goes on beside others."""
 
-current_task: ContextVar[Task[Worker] | None] = ContextVar("hfg.task", default=None)
+current_task: ContextVar[Task[RunningNode] | None] = ContextVar("hfg.task", default=None)
 """Whose code runs, if it is that of a task; also in the tasks that it starts by itself."""

@@ -11,22 +11,22 @@ class Ending:
     """How far the end of one node is; it has one from its last firing on, until it starts afresh.
 
     Attributes:
-      given_up: it counts as ended without having said END, nor will it (R5).
+      is_dead_source: it counts as ended without having said END, nor will it (R5).
       pending: END leaves as soon as the outputs are free; with the stamp `stamp`.
       deferred: modifiers that were drained, and act behind END; None from then on.
     """
 
-    __slots__ = ("deferred", "given_up", "pending", "stamp")
+    __slots__ = ("deferred", "is_dead_source", "pending", "stamp")
 
-    def __init__(self, *, given_up: bool) -> None:
-        self.given_up = given_up
+    def __init__(self, *, is_dead_source: bool) -> None:
+        self.is_dead_source = is_dead_source
         self.pending = False
         self.stamp: float | None = None
         self.deferred: list[int] | None = []
 
     def promise(self, stamp: float | None) -> None:
         """END follows when the outputs are free."""
-        assert not self.given_up, "END of a node that nobody hears any more (R5)"
+        assert not self.is_dead_source, "END of a node that nobody hears any more (R5)"
         self.pending = True
         self.stamp = stamp
 
@@ -65,5 +65,5 @@ class Ending:
         Raises:
           EngineInternalError: it does not.
         """
-        if self.pending and self.given_up:
+        if self.pending and self.is_dead_source:
             raise EngineInternalError(f'node "{path}": END is to follow, though it is given up (R5)')

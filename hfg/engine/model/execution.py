@@ -19,29 +19,29 @@ class Execution:
     Attributes:
       in_flight: it waits on the loop, or is in a thread.
       job: what a thread does for it, perhaps with others of its region.
-      carrier: the dormant task that its coroutines run in; None: the next one makes another.
+      eager_task: the dormant task that its coroutines run in; None: the next one makes another.
       generator: what a source draws its next values from; None: it has ended, or begins at its next firing.
       limit_timer: how long the firing may take.
       taken: the values that the firing has taken, if the event `failed` is to tell them (X1).
     """
 
-    __slots__ = ("carrier", "generator", "in_flight", "job", "limit_timer", "taken")
+    __slots__ = ("eager_task", "generator", "in_flight", "job", "limit_timer", "taken")
 
     def __init__(self) -> None:
         self.in_flight = False
         self.job: Any = None
-        self.carrier: Any = None
+        self.eager_task: Any = None
         self.generator: Any = None
         self.limit_timer: Timer | None = None
         self.taken: dict[str, Any] | None = None
 
-    def run_in(self, carrier: object) -> None:
+    def run_in(self, eager_task: object) -> None:
         """Its coroutines run in this task from now on; None: what goes on in the last one does so without the node."""
-        self.carrier = carrier
+        self.eager_task = eager_task
 
     def exchange(self, other: Execution) -> None:
         """The code that runs in the task of another node is this one's: each has the other's task from now on."""
-        self.carrier, other.carrier = other.carrier, self.carrier
+        self.eager_task, other.eager_task = other.eager_task, self.eager_task
 
     def take_job(self, job: object) -> None:
         """A thread works for it."""

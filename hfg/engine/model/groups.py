@@ -46,7 +46,7 @@ class Group(Generic[NodeT]):
       take: gives out what is to be stepped next.
       in_a_row: nobody wants to see each turn by itself: a step may go on with the next in the queue, while there are
         turns.
-      turns: how many nodes may move before the pump looks round, the one whose turn it is included; 1 if it is not the
+      budget: how many nodes may move before the pump looks round, the one whose turn it is included; 1 if it is not the
         pump that lets them.
       signal_step: of all its nodes that live by slots which events feed, once there is one.
     """
@@ -64,22 +64,22 @@ class Group(Generic[NodeT]):
         self.take: Callable[[], NodeT] = policy.pop
         self.charges: Callable[[NodeT, float], None] | None = getattr(policy, "charge", None)
         self.clock = clock  # read only where time is shared
-        self.held = False
+        self.paused = False
         self.in_a_row = False
-        self.turns = 1
+        self.budget = 1
         self.signal_step: Callable[[NodeT], None] | None = None
 
-    def hold(self, held: bool) -> None:
+    def pause(self, paused: bool) -> None:
         """R3: whether nobody of it moves, for the run is paused."""
-        self.held = held
+        self.paused = paused
 
-    def give_turns(self, turns: int) -> None:
+    def set_budget(self, budget: int) -> None:
         """So many nodes may move before the pump looks round."""
-        self.turns = turns
+        self.budget = budget
 
-    def had_turns(self, more: int) -> None:
+    def spend(self, more: int) -> None:
         """So many more nodes have moved in the step of the one that the pump has let move."""
-        self.turns -= more
+        self.budget -= more
 
     def look_at_each_turn(self, take: Callable[[], Any]) -> None:
         """Somebody wants to see each turn by itself: this gives out what stands for the node whose turn it is."""

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections import Counter
 
 from hfg.engine.model.core import Core
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.errors import EngineInternalError
 from hfg.ports.edges import EventEdge
 
 __all__ = ["check_invariants"]
 
 
-def check_invariants(core: Core[Worker]) -> None:
+def check_invariants(core: Core[RunningNode]) -> None:
     """Between two steps of the run certain things hold of all of it: nodes, edges, regions, and between them.
 
     Raises:
@@ -27,23 +27,23 @@ def check_invariants(core: Core[Worker]) -> None:
     for region in core.regions:
         region.check_invariants()
     _check_queues(core)
-    if core.followers or core.returned or core.drained or core.late is not None:
+    if core.next_in_wave or core.returned or core.drained or core.deferred_events is not None:
         raise EngineInternalError("a sending is not over: who follows, or what was returned or drained, is left")
     for scope in core.scopes:
         if scope.watched and scope not in core.dirty_scopes and scope.active != scope.derive():
             raise EngineInternalError(f'subgraph "{scope.path}": its activity is not that of its inside (G2)')
 
 
-def _check_workers(core: Core[Worker]) -> None:
+def _check_workers(core: Core[RunningNode]) -> None:
     """What lies on the edges is what the nodes at their ends have counted."""
-    held: Counter[Worker] = Counter()
-    full: Counter[Worker] = Counter()
+    held: Counter[RunningNode] = Counter()
+    full: Counter[RunningNode] = Counter()
     for edge in core.edges:
         edge.check_invariants()
         if isinstance(edge, EventEdge):
             full[edge.source] += edge.full
         else:
-            held[edge.waits] += edge.held
+            held[edge.waits] += edge.unprocessed
     for worker in core.workers:
         worker.check_invariants()
         worker.outputs.check_invariants(held[worker], f'outputs of "{worker.path}"')
@@ -53,7 +53,7 @@ def _check_workers(core: Core[Worker]) -> None:
             raise EngineInternalError(f'node "{worker.path}": its region is gone')
 
 
-def _check_queues(core: Core[Worker]) -> None:
+def _check_queues(core: Core[RunningNode]) -> None:
     """Who is queued stands in the run queue of its group, once, and nobody else does."""
     standing = Counter(worker for group in {worker.group for worker in core.workers} for worker in group.policy)
     for worker in core.workers:

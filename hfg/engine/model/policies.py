@@ -15,7 +15,7 @@ from math import inf
 from typing import Any
 
 from hfg.engine.model.groups import Policy
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.errors import UsageError
 
 __all__ = [
@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 
-class Fifo(deque[Worker]):
+class Fifo(deque[RunningNode]):
     """First in, first out among waves, and within a wave depth first: the default.
 
     What a firing enables over sequential edges goes in front of all that waits, so a wave comes to its end before the
@@ -45,22 +45,22 @@ class _Ranked:
     """A heap of workers by rank, the least first; first in, first out among equals."""
 
     def __init__(self) -> None:
-        self._heap: list[tuple[float, int, Worker]] = []
+        self._heap: list[tuple[float, int, RunningNode]] = []
         self._count = itertools.count()
 
-    def _insert(self, rank: float, worker: Worker) -> None:
+    def _insert(self, rank: float, worker: RunningNode) -> None:
         heapq.heappush(self._heap, (rank, next(self._count), worker))
 
-    def pop(self) -> Worker:
+    def pop(self) -> RunningNode:
         """See `Policy`."""
         return heapq.heappop(self._heap)[2]
 
-    def remove(self, worker: Worker) -> None:
+    def remove(self, worker: RunningNode) -> None:
         """See `Policy`."""
         self._heap = [entry for entry in self._heap if entry[2] is not worker]
         heapq.heapify(self._heap)
 
-    def __iter__(self) -> Iterator[Worker]:
+    def __iter__(self) -> Iterator[RunningNode]:
         return iter([worker for _, _, worker in sorted(self._heap, key=lambda entry: entry[:2])])
 
     def __len__(self) -> int:
@@ -70,7 +70,7 @@ class _Ranked:
 class Priority(_Ranked):
     """The highest priority first."""
 
-    def push(self, worker: Worker) -> None:
+    def push(self, worker: RunningNode) -> None:
         """See `Policy`."""
         self._insert(-worker.priority, worker)
 
@@ -82,15 +82,15 @@ class EarliestDeadline(_Ranked):
     source's is counted from now.
     """
 
-    def push(self, worker: Worker) -> None:
+    def push(self, worker: RunningNode) -> None:
         """See `Policy`."""
         allowed = worker.options.deadline_s if worker.options is not None else None
         self._insert(inf if allowed is None else _oldest_stamp(worker) + allowed, worker)
 
 
-def _oldest_stamp(worker: Worker) -> float:
+def _oldest_stamp(worker: RunningNode) -> float:
     """When the oldest of what it takes next was made."""
-    if worker.calls and not (worker.placed and not worker.ahead):
+    if worker.calls and not (worker.fireable and not worker.calls_before):
         edges: tuple[Any, ...] = (worker.calls[0],)
     else:
         edges = worker.live_inputs
@@ -107,13 +107,13 @@ class FairShare(_Ranked):
     def __init__(self) -> None:
         super().__init__()
         self._served = 0.0  # where the turn that was given out last starts
-        self._ended: dict[Worker, float] = {}  # where each worker's last turn ended
+        self._ended: dict[RunningNode, float] = {}  # where each worker's last turn ended
 
-    def push(self, worker: Worker) -> None:
+    def push(self, worker: RunningNode) -> None:
         """See `Policy`."""
         self._insert(max(self._served, self._ended.get(worker, 0.0)), worker)
 
-    def pop(self) -> Worker:
+    def pop(self) -> RunningNode:
         """See `Policy`."""
         while True:
             start, number, worker = heapq.heappop(self._heap)
@@ -125,7 +125,7 @@ class FairShare(_Ranked):
         self._ended[worker] = max(start, ended)
         return worker
 
-    def charge(self, worker: Worker, busy_s: float) -> None:
+    def charge(self, worker: RunningNode, busy_s: float) -> None:
         """Put what a turn took on the worker's account."""
         self._ended[worker] = self._ended.get(worker, self._served) + busy_s
 
@@ -135,31 +135,31 @@ class SeededRandom:
 
     def __init__(self, seed: int | None = None) -> None:
         self._random = random.Random(0 if seed is None else seed)
-        self._workers: list[Worker] = []
+        self._workers: list[RunningNode] = []
 
-    def push(self, worker: Worker) -> None:
+    def push(self, worker: RunningNode) -> None:
         """See `Policy`."""
         self._workers.append(worker)
 
-    def pop(self) -> Worker:
+    def pop(self) -> RunningNode:
         """See `Policy`."""
         workers = self._workers
         position = self._random.randrange(len(workers))
         workers[position], workers[-1] = workers[-1], workers[position]
         return workers.pop()
 
-    def remove(self, worker: Worker) -> None:
+    def remove(self, worker: RunningNode) -> None:
         """See `Policy`."""
         self._workers.remove(worker)
 
-    def __iter__(self) -> Iterator[Worker]:
+    def __iter__(self) -> Iterator[RunningNode]:
         return iter(self._workers)
 
     def __len__(self) -> int:
         return len(self._workers)
 
 
-POLICIES: dict[str, Callable[[int | None], Policy[Worker]]] = {
+POLICIES: dict[str, Callable[[int | None], Policy[RunningNode]]] = {
     "fifo": lambda seed: Fifo(),
     "priority": lambda seed: Priority(),
     "deadline": lambda seed: EarliestDeadline(),
@@ -168,7 +168,7 @@ POLICIES: dict[str, Callable[[int | None], Policy[Worker]]] = {
 }
 
 
-def make_policy(name: str, seed: int | None) -> Policy[Worker]:
+def make_policy(name: str, seed: int | None) -> Policy[RunningNode]:
     """Make a run queue.
 
     Raises:

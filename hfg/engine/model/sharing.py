@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hfg.base.token import Marker, Token
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.errors import in_words
 from hfg.nodetypes.node import Node
 from hfg.ports.edges import NUMBER, Edge, Lying, SyncEdge
@@ -210,7 +210,7 @@ class Sharing:
 
     def __init__(self) -> None:
         self._lying: dict[Edge, deque[_Lease]] = {}
-        self._at_work: dict[Worker, list[_Lease]] = {}
+        self._at_work: dict[RunningNode, list[_Lease]] = {}
         self._locks: dict[int, _Lock] = {}
         self._sent: dict[Any, _Sent] = {}
         self._last_locked: dict[int, tuple[weakref.ref[Array], Edge]] = {}
@@ -272,7 +272,7 @@ class Sharing:
             self._last_locked.clear()
         self._last_locked[id(owner)] = weakref.ref(owner), edge
 
-    def take(self, worker: Worker, edges: Sequence[Edge], tokens: Sequence[Token[Any]]) -> list[Edge]:
+    def take(self, worker: RunningNode, edges: Sequence[Edge], tokens: Sequence[Token[Any]]) -> list[Edge]:
         """A firing or call has taken these tokens; gives those edges on which the value was changed meanwhile."""
         changed = []
         for edge, token in zip(edges, tokens, strict=True):
@@ -290,7 +290,7 @@ class Sharing:
         self.sweep()
         return changed
 
-    def changed_by(self, worker: Worker) -> tuple[Edge, bool] | None:
+    def changed_by(self, worker: RunningNode) -> tuple[Edge, bool] | None:
         """Its code is over: from where it has a value that is not what it was, if it has one.
 
         And whether the code of who has sent that ran meanwhile, too.
@@ -316,7 +316,7 @@ class Sharing:
                 del self._lying[edge]
         for worker, taken in list(self._at_work.items()):
             ticket = worker.ticket if worker.busy else None
-            beside = () if worker.flights is None else {one.number for one in worker.flights if not one.outcome}
+            beside = () if worker.concurrent is None else {one.number for one in worker.concurrent if not one.outcome}
             going_on = [lease for lease in taken if lease.ticket == ticket or lease.firing in beside]
             if len(going_on) == len(taken):
                 continue
@@ -344,7 +344,7 @@ class Sharing:
 
     # --- who has tried ----------------------------------------------------------------------------------------------
 
-    def explain(self, worker: Worker, error: BaseException) -> str | None:
+    def explain(self, worker: RunningNode, error: BaseException) -> str | None:
         """Say what a node's code has tried to write to, if it failed because we have made that read-only."""
         if not isinstance(error, Exception) or _READ_ONLY.search(in_words(error)) is None:
             return None

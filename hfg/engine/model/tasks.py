@@ -22,12 +22,12 @@ class Task(Generic[NodeT]):
       worker: whose code has started it.
       name: of its coroutine function.
       coroutine: what it runs.
-      carrier: what carries it once it has begun.
+      eager_task: what carries it once it has begun.
       cancelled: its node is torn down or switched off, the run is over, or a do-activity is to end with A(v).
       doing: of a do-activity.
     """
 
-    __slots__ = ("cancelled", "carrier", "coroutine", "doing", "name", "worker")
+    __slots__ = ("cancelled", "coroutine", "doing", "eager_task", "name", "worker")
 
     def __init__(
         self, worker: NodeT, name: str, coroutine: Coroutine[Any, Any, Any], doing: Doing[NodeT] | None = None
@@ -36,7 +36,7 @@ class Task(Generic[NodeT]):
         self.doing = doing
         self.name = name
         self.coroutine = coroutine
-        self.carrier: Any = None
+        self.eager_task: Any = None
         self.cancelled = False
 
     @property
@@ -44,19 +44,19 @@ class Task(Generic[NodeT]):
         """What it is called where it fails."""
         return f'task "{self.name}"' if self.doing is None else "do()"
 
-    def be_carried(self, carrier: object) -> None:
+    def run_in(self, eager_task: object) -> None:
         """It begins."""
-        self.carrier = carrier
+        self.eager_task = eager_task
 
     def is_current(self) -> bool:
         """Whether the code that asks is its own, and not that of something which it has started by itself."""
-        return self.carrier is not None and self.carrier.is_current()
+        return self.eager_task is not None and self.eager_task.is_current()
 
     def cancel(self) -> None:
         """Let it end: at what it waits for, or before it has begun."""
         self.cancelled = True
-        if self.carrier is not None:
-            self.carrier.cancel()
+        if self.eager_task is not None:
+            self.eager_task.cancel()
 
 
 class Doing(Generic[NodeT]):

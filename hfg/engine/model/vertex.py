@@ -195,7 +195,7 @@ class Vertex(Generic[NodeT]):
     def iterate(self, iteration: Iteration[NodeT]) -> None:
         """G4: its process function is the inside of a subgraph, which sees the elements one by one."""
         self.iteration = iteration
-        self.process = self.core.upstairs.iterate  # to which `firing` comes by itself; without one it would be no node
+        self.process = self.core.rules.iterate  # to which `firing` comes by itself; without one it would be no node
         self.is_source = False
 
     def lie_within(self, iteration: Iteration[NodeT]) -> None:

@@ -52,12 +52,12 @@ class Listener:
     Attributes:
       consumer: what was given.
       error: what it raised, for which it was removed; None else.
-      seldom: it wants no events of single tokens, firings and calls, so that nobody leaves his fast path for it.
+      changes_only: it wants no events of single tokens, firings and calls, so that nobody leaves his fast path for it.
     """
 
-    def __init__(self, consumer: Any, consumers: Consumers, *, seldom: bool = False) -> None:
+    def __init__(self, consumer: Any, consumers: Consumers, *, changes_only: bool = False) -> None:
         self.consumer = consumer
-        self.seldom = seldom
+        self.changes_only = changes_only
         self.error: BaseException | None = None
         self._consumers = consumers
         self._open = True
@@ -274,14 +274,14 @@ class Consumers:
         """One came or went. Nobody listens: nothing is built. One: it is called. Several: one after the other."""
         self._listeners = [listener for listener in self._listeners if listener.is_open]
         core = self._engine.core
-        core.seldom = _all_of([listener.take for listener in self._listeners])
+        core.trace_changes = _all_of([listener.take for listener in self._listeners])
         before = core.trace
-        core.trace = _all_of([listener.take for listener in self._listeners if not listener.seldom])
+        core.trace = _all_of([listener.take for listener in self._listeners if not listener.changes_only])
         if self._sieve is not None and core.trace is not None:
             core.trace = _sieved(self._sieve, core.trace)
         if core.trace is before:
             return
-        core.speaker = None
+        core.running_node = None
         if core.started:
             for worker in core.workers:
                 specialise(worker)

@@ -69,7 +69,7 @@ class Glance(msgspec.Struct, frozen=True):
 
 
 def glance_at(engine: Engine) -> Glance:
-    """Look at a run; to be called on its loop."""
+    """TokenTap at a run; to be called on its loop."""
     nodes = []
     engine.core.settle_counts()
     engine.core.settle_barriers()
@@ -93,7 +93,7 @@ def glance_at(engine: Engine) -> Glance:
         )
     return Glance(
         graph=engine.graph.name,
-        outcome="paused" if engine.core.held and engine.outcome == "running" else engine.outcome,
+        outcome="paused" if engine.core.paused and engine.outcome == "running" else engine.outcome,
         duration_s=engine.elapsed() if engine.core.started else 0.0,
         machine_s=time.monotonic(),
         nodes=nodes,

@@ -13,12 +13,12 @@ from typing import Any
 
 from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.fusion.specialise import specialise
-from hfg.engine.model.worker import (
+from hfg.engine.model.running_node import (
     BACKOFF,
+    DEAD_SOURCE,
     DISABLED,
     ENDED,
     FULL,
-    FUTILE,
     RATE,
     RECORDED,
     RESTING,
@@ -26,7 +26,7 @@ from hfg.engine.model.worker import (
     TORN_DOWN,
     UNREADY,
     UNWIRED,
-    Worker,
+    RunningNode,
 )
 from hfg.engine.observing.meters import Distribution, Meter
 from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
@@ -40,9 +40,9 @@ _LOOKS_SHARE = 0.01  # of the loop's time at most
 _RATE_OVER_S = 1.0
 
 
-def doing(worker: Worker) -> str:
+def doing(worker: RunningNode) -> str:
     """Say what a node does or waits for now, in the words of `NodeStatistics.waiting`."""
-    if worker.busy or worker.is_flying():
+    if worker.busy or worker.has_concurrent_code():
         return "working"
     if worker.tasks is not None and worker.tasks.doing.task is not None:
         return "do"
@@ -58,7 +58,7 @@ def doing(worker: Worker) -> str:
                 return f"input {edge.port_name}"
     if worker.outputs.missing:
         for name, edges in zip(worker.out_names, worker.out_edges, strict=False):
-            if any(edge.held for edge in edges):
+            if any(edge.unprocessed for edge in edges):
                 return f"output {name}"
     return "turn"
 
@@ -74,7 +74,7 @@ _BLOCKED = (
     (RATE, "rate"),
     (UNREADY, "ready"),
     (UNWIRED, "unconnected"),
-    (FUTILE, "ended"),
+    (DEAD_SOURCE, "ended"),
 )
 
 
@@ -106,10 +106,10 @@ class Measuring:
         if engine.ended_how is not None:
             self._end()
 
-    def _workers(self) -> Iterator[Worker]:
+    def _workers(self) -> Iterator[RunningNode]:
         return (worker for worker in self._engine.core.workers if worker.type is not None and worker.scope is None)
 
-    def _meter(self, worker: Worker) -> Meter:
+    def _meter(self, worker: RunningNode) -> Meter:
         meter: Meter | None = worker.meter
         if meter is None:
             meter = Meter(worker)
@@ -145,7 +145,7 @@ class Measuring:
             now = monotonic()
             self._fold_at = now + max(_LOOK_EVERY_S, (now - began) / _LOOKS_SHARE)
 
-    def _fold(self, worker: Worker) -> Meter:
+    def _fold(self, worker: RunningNode) -> Meter:
         meter = self._meter(worker)
         meter.fold()
         return meter
@@ -203,7 +203,7 @@ class Measuring:
         passed = now - self._began
         over = now - self._before_at
         nodes: dict[str, NodeStatistics] = {}
-        parts: dict[str, list[tuple[Worker, NodeStatistics, float]]] = {name: [] for name in engine.groups}
+        parts: dict[str, list[tuple[RunningNode, NodeStatistics, float]]] = {name: [] for name in engine.groups}
         for worker in self._workers():
             node, busy = self._node(worker, passed, machine, over)
             nodes[worker.path] = node
@@ -222,7 +222,7 @@ class Measuring:
             errors=[str(error) for error in core.errors],
         )
 
-    def _node(self, worker: Worker, passed: float, machine: float, over: float) -> tuple[NodeStatistics, float]:
+    def _node(self, worker: RunningNode, passed: float, machine: float, over: float) -> tuple[NodeStatistics, float]:
         meter = self._fold(worker)
         busy = meter.busy_s
         pieces = worker.counts.done
@@ -270,7 +270,7 @@ def _times(of: Distribution) -> Times:
     return Times(of.count, of.total, of.mean, of.longest, median, slow, tuple(of.newest))
 
 
-def _group(members: list[tuple[Worker, NodeStatistics, float]], machine: float) -> GroupStatistics:
+def _group(members: list[tuple[RunningNode, NodeStatistics, float]], machine: float) -> GroupStatistics:
     busy = sum(seconds for _, _, seconds in members)
     return GroupStatistics(
         nodes=len(members),

@@ -14,7 +14,7 @@ from time import monotonic
 from types import CoroutineType
 from typing import Any
 
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 
 __all__ = ["BATCH", "KEPT", "Distribution", "Meter"]
 
@@ -118,7 +118,7 @@ class Meter:
         "worker",
     )
 
-    def __init__(self, worker: Worker) -> None:
+    def __init__(self, worker: RunningNode) -> None:
         self.worker = worker
         self.code: Any = worker.process
         self.left = BATCH

@@ -23,8 +23,8 @@ from msgspec.structs import replace
 
 from hfg.base.logs import Log
 from hfg.base.token import END, NO_MESSAGE, Marker, Token
-from hfg.engine.model.looks import Look, WaveLook
-from hfg.engine.model.worker import ENDED, RECORDED, Worker
+from hfg.engine.model.running_node import ENDED, RECORDED, RunningNode
+from hfg.engine.model.tap import BatchTap, TokenTap
 from hfg.engine.observing.consumers import Consumers, Listener
 from hfg.engine.observing.taps import Taps
 from hfg.engine.rules.agenda import unblock
@@ -190,9 +190,9 @@ class _Looker:
 
     def __init__(self, place: Place) -> None:
         self.place = place
-        self.put: Look = _no_token
+        self.put: TokenTap = _no_token
         self.end = _nothing
-        self.worker: Worker | None = None
+        self.worker: RunningNode | None = None
         self.silent = 0
 
 
@@ -207,7 +207,7 @@ class Recorder(Listener):
     def __init__(
         self, engine: Engine, consumers: Consumers, taps: Taps, thread: RecordingThread, *, lossless: bool
     ) -> None:
-        super().__init__(self._seldom_event, consumers, seldom=True)
+        super().__init__(self._seldom_event, consumers, changes_only=True)
         self._engine = engine
         self._taps = taps
         self._thread = thread
@@ -218,7 +218,7 @@ class Recorder(Listener):
         self._mark = _WAKE_AFTER
         self._full = False
         self._left_out = False  # and nothing has been put since
-        self._held: list[Worker] = []
+        self._held: list[RunningNode] = []
         self._held_since: float | None = None
         self._room = threading.Event()
         self.held_s = 0.0
@@ -249,7 +249,7 @@ class Recorder(Listener):
         elif getattr(getattr(what, "node", None), "_type", _NO_SOURCE).is_source:
             put = partial(self._output_of_source, looker, put)
         # (what leaves a fused region's source in a wave is as plain as what leaves the others: no circumstances)
-        looker.put = put if place.keep is not None else WaveLook.of(put, place, self._put_wave)
+        looker.put = put if place.keep is not None else BatchTap.of(put, place, self._put_wave)
         self._lookers[looker] = self._taps.look(what, looker)
         self._find_sender(looker)
 
@@ -400,7 +400,7 @@ class Recorder(Listener):
         if core.over or self._held_since is not None:
             return
         self._held_since = monotonic()
-        core.set_out()  # the run is not quiet meanwhile
+        core.begin_async()  # the run is not quiet meanwhile
         for worker in self._held:
             worker.block(RECORDED)
         if not self.times_held:
@@ -427,7 +427,7 @@ class Recorder(Listener):
         held, self._held = self._held, []
         if self._engine.core.over:
             return
-        self._engine.core.come_back()
+        self._engine.core.end_async()
         for worker in held:
             unblock(worker, RECORDED)
         self._engine.kick()
@@ -450,7 +450,7 @@ class Recorder(Listener):
             self.on_structure()
 
     def stop(self) -> None:
-        """Look at nothing any more; what lies before the thread is still written. Does nothing the second time."""
+        """TokenTap at nothing any more; what lies before the thread is still written. Does nothing the second time."""
         if not self._open:
             return
         for remove in self._lookers.values():
@@ -472,7 +472,7 @@ class Recorder(Listener):
             await asyncio.sleep(0)
 
 
-def _waited(worker: Worker) -> bool:
+def _waited(worker: RunningNode) -> bool:
     """Whether the firing that is over has waited: an async one that has not is over in its turn."""
     return worker.is_async and not worker.core.pumping
 

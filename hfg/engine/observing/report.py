@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import msgspec
 
 from hfg.engine.model import Core
-from hfg.engine.model.worker import ENDED
+from hfg.engine.model.running_node import ENDED
 from hfg.engine.observing.tables import seconds, table
 from hfg.graph import Graph
 

@@ -15,8 +15,8 @@ from typing import Any, Protocol, TypeAlias
 from hfg.base.token import Token
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.events import RunningEvent
-from hfg.engine.model.looks import FirstLiveLook, Look
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
+from hfg.engine.model.tap import FirstLiveTap, TokenTap
 from hfg.engine.rules.listening import find_listeners
 from hfg.engine.runtime import ports, relays
 from hfg.engine.runtime.callbacks import Edited
@@ -69,7 +69,7 @@ class Tap:
         return self._buffer.seen - self._given - len(self._buffer.kept)
 
     def close(self) -> None:
-        """Look no more; the iteration ends behind what is kept. Does nothing the second time."""
+        """TokenTap no more; the iteration ends behind what is kept. Does nothing the second time."""
         self._detach()
         self._buffer.end()
 
@@ -115,7 +115,7 @@ class Looker(Protocol):
     """Who looks at what passes."""
 
     @property
-    def put(self) -> Look:
+    def put(self) -> TokenTap:
         """Called with each token that passes."""
 
     def end(self) -> None:
@@ -178,8 +178,10 @@ class Taps:
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
-        self._buffers: dict[Looker, tuple[Any, list[tuple[Any, Look]]]] = {}  # what each looks at, and where that is
-        self._looks: dict[Any, list[Look]] = {}  # by edge, event, or (worker, slot) for edges still to come
+        self._buffers: dict[
+            Looker, tuple[Any, list[tuple[Any, TokenTap]]]
+        ] = {}  # what each looks at, and where that is
+        self._looks: dict[Any, list[TokenTap]] = {}  # by edge, event, or (worker, slot) for edges still to come
         engine.callbacks.finished.append(self._end)
         engine.callbacks.edited.append(self._find_again)
         engine.callbacks.joined.append(self._adopt)
@@ -209,9 +211,9 @@ class Taps:
             looker.end()
         return partial(self._remove, looker)
 
-    def workers(self, looker: Looker) -> list[Worker]:
+    def workers(self, looker: Looker) -> list[RunningNode]:
         """Those whose tokens somebody looks at, as the graph is now."""
-        found: dict[Worker, None] = {}
+        found: dict[RunningNode, None] = {}
         for place, _ in self._buffers.get(looker, (None, []))[1]:
             if isinstance(place, RunningEvent):
                 found[place.worker] = None
@@ -233,9 +235,7 @@ class Taps:
             self._attach(buffer, what, places)
 
     def _attach(self, buffer: Looker, what: Any, places: list[tuple[Any, list[Any]]]) -> None:
-        looks = [
-            (place, FirstLiveLook.of(group, place, buffer.put) if group else buffer.put) for place, group in places
-        ]
+        looks = [(place, FirstLiveTap.of(group, place, buffer.put) if group else buffer.put) for place, group in places]
         self._buffers[buffer] = (what, looks)
         for place, look in looks:
             self._looks.setdefault(place, []).append(look)
@@ -269,7 +269,7 @@ class Taps:
             self._tell_event(place)
         elif not isinstance(place, tuple):
             place.tap = looks[0] if len(looks) == 1 else partial(_all_of, looks) if looks else None
-            source: Worker = place.source
+            source: RunningNode = place.source
             find_listeners(source)
             if source.core.started and not self._engine.core.over:
                 specialise(source)
@@ -277,7 +277,7 @@ class Taps:
                 if place in event.edges:
                     self._tell_event(event)
 
-    def _tell_event(self, event: RunningEvent[Worker]) -> None:
+    def _tell_event(self, event: RunningEvent[RunningNode]) -> None:
         looks = tuple(self._looks.get(event, ()))
         event.tap = looks if looks or any(edge.tap is not None for edge in event.edges) else None
         if event.tap is not None and event.port is not None and event.port._observers is None:
@@ -339,11 +339,11 @@ class Taps:
             )
         return what
 
-    def _running(self, event: Any) -> RunningEvent[Worker] | None:
+    def _running(self, event: Any) -> RunningEvent[RunningNode] | None:
         worker = self._worker(event)
         return worker.events.get(event.name) if worker.node is None else ports.bind_event(worker, event.name)
 
-    def _worker(self, port: Any) -> Worker:
+    def _worker(self, port: Any) -> RunningNode:
         if port.node is self._engine.graph:
             boundary = self._engine.core.boundary
             assert boundary is not None
@@ -363,6 +363,6 @@ def _label(edge: Any) -> str:
     return f"{edge.source.path} -> {edge.target.path}" if isinstance(edge, Ends) else str(edge.label)
 
 
-def _all_of(looks: tuple[Look, ...], token: Token[Any]) -> None:
+def _all_of(looks: tuple[TokenTap, ...], token: Token[Any]) -> None:
     for look in looks:
         look(token)

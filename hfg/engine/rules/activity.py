@@ -14,17 +14,17 @@ import msgspec
 
 from hfg.base.token import Token
 from hfg.engine.model import Core, Gate, Scope
-from hfg.engine.model.worker import AMID_NOTHING, RATE, RESTING, Worker
+from hfg.engine.model.running_node import BETWEEN_FIRINGS, RATE, RESTING, RunningNode
 from hfg.engine.rules import doing
 from hfg.engine.rules.agenda import consider, must_wait
 from hfg.engine.rules.modifiers import automatic, set_active, touch
-from hfg.engine.rules.sending import flush_automatic, tell, trigger
+from hfg.engine.rules.sending import emit_automatic, send_automatic, trigger
 from hfg.ports.edges import AnyEdge
 
 __all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "rest", "scopes_changed"]
 
 
-def changed(worker: Worker, active: bool) -> None:
+def changed(worker: RunningNode, active: bool) -> None:
     """A(v) has just become `active`."""
     core = worker.core
     automatic(worker, "activated" if active else "deactivated")
@@ -37,11 +37,11 @@ def changed(worker: Worker, active: bool) -> None:
                 _look_at(scope)
     if worker.has_hooks:
         _call_hooks(worker, active)
-    if worker.busy in AMID_NOTHING:
-        tell(worker)
+    if worker.busy in BETWEEN_FIRINGS:
+        emit_automatic(worker)
 
 
-def _call_hooks(worker: Worker, active: bool) -> None:
+def _call_hooks(worker: RunningNode, active: bool) -> None:
     """What its code is told; the do-activity begins behind `on_activated` (A15)."""
     if not doing.has(worker):
         _call_hook(worker, "on_activated" if active else "on_deactivated", None)
@@ -53,7 +53,7 @@ def _call_hooks(worker: Worker, active: bool) -> None:
         _call_hook(worker, "on_deactivated", None)
 
 
-def _call_hook(worker: Worker, name: str, then: Callable[[Worker], None] | None) -> None:
+def _call_hook(worker: RunningNode, name: str, then: Callable[[RunningNode], None] | None) -> None:
     hook = worker.node._hook(name)
     if hook is None:
         if then is not None:
@@ -62,33 +62,33 @@ def _call_hook(worker: Worker, name: str, then: Callable[[Worker], None] | None)
 
     def done(_result: object, error: BaseException | None) -> None:
         if error is not None:
-            worker.core.upstairs.fail(worker, f"{name}()", error, answer=False)
+            worker.core.rules.fail(worker, f"{name}()", error, answer=False)
         if then is not None:
             then(worker)
 
-    worker.core.code.execute_aside(worker, hook, done)
+    worker.core.code.execute_hook(worker, hook, done)
 
 
-def _time_out_later(worker: Worker, active: bool) -> None:
+def _time_out_later(worker: RunningNode, active: bool) -> None:
     """A12: the time runs from the change from 0 to 1; the timer counts only if the event leads somewhere."""
     limit = worker.active_for_s
     worker.time_activity(None)
     if active and limit is not None:
         core = worker.core
         leads = worker.timeout_leads_somewhere()
-        worker.time_activity(core.host.call_at(core.now() + limit, lambda: _time_out(worker), counts=leads))
+        worker.time_activity(core.runtime.call_at(core.now() + limit, lambda: _time_out(worker), counts=leads))
 
 
-def _time_out(worker: Worker) -> None:
+def _time_out(worker: RunningNode) -> None:
     worker.time_activity(None)
     event = worker.events.get("timeout")
     if event is None:
         return
     trigger(event, stamp=worker.core.now(), extend_right=False)
-    worker.keep_right(False)  # behind the sending, which may have given it (A3)
+    worker.let_carry(False)  # behind the sending, which may have given it (A3)
     scopes_changed(worker.core)
-    if worker.busy in AMID_NOTHING:  # else after the firing (A9)
-        flush_automatic(worker)
+    if worker.busy in BETWEEN_FIRINGS:  # else after the firing (A9)
+        send_automatic(worker)
 
 
 def gate_changed(gates: Iterable[Gate]) -> None:
@@ -99,7 +99,7 @@ def gate_changed(gates: Iterable[Gate]) -> None:
                 rest(worker)
 
 
-def rest(worker: Worker) -> None:
+def rest(worker: RunningNode) -> None:
     """Let a source rest, or go on, as its gates say now."""
     if worker.blocked & RATE:
         worker.rate_over()
@@ -108,8 +108,8 @@ def rest(worker: Worker) -> None:
             worker.block(RESTING)
         return
     worker.allow(RESTING)
-    if worker.placed and must_wait(worker):  # throttled from now on (A11)
-        worker.lose_place()
+    if worker.fireable and must_wait(worker):  # throttled from now on (A11)
+        worker.make_unfireable()
     else:
         consider(worker)
 
@@ -136,7 +136,7 @@ def scopes_changed(core: Core) -> None:
         owner.become(active)
         automatic(owner, "activated" if active else "deactivated")
         _time_out_later(owner, active)
-        flush_automatic(owner)
+        send_automatic(owner)
 
 
 def _look_at(scope: Scope) -> None:
@@ -165,9 +165,9 @@ def deactivate_inside(scope: Scope, cause: Literal["sent", "slot"]) -> None:
     touch(core, (scope,))
 
 
-def _forget(worker: Worker) -> None:
+def _forget(worker: RunningNode) -> None:
     """Take the right of A3, and what the tokens that were drained are to do (F12)."""
-    worker.keep_right(False)
+    worker.let_carry(False)
     if worker.ending is not None:
         worker.ending.strip()
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from hfg.engine.model import Core
 from hfg.engine.model.rate import SAME_MOMENT_S
-from hfg.engine.model.worker import DISABLED, FULL, NO_CALLS, UNREADY, Worker
+from hfg.engine.model.running_node import DISABLED, FULL, NO_CALLS, UNREADY, RunningNode
 from hfg.ports.edges import Edge, EventEdge
 
 __all__ = [
@@ -16,47 +16,47 @@ __all__ = [
     "consider",
     "freed",
     "idle_again",
-    "let_follow",
+    "make_fireable",
     "must_wait",
     "note_full",
-    "place",
+    "queue_next_in_wave",
     "unblock",
 ]
 
 
-def place(worker: Worker) -> bool:
+def make_fireable(worker: RunningNode) -> bool:
     """Give the next firing its place if all that a firing needs holds now (F1, F9); it is still to be queued."""
-    if worker.blocked or worker.placed or worker.inputs.missing or worker.outputs.missing:
+    if worker.blocked or worker.fireable or worker.inputs.missing or worker.outputs.missing:
         return False
     if worker.paced and must_wait(worker):
         return False
-    worker.take_place()
+    worker.make_fireable()
     return True
 
 
-def consider(worker: Worker) -> None:
+def consider(worker: RunningNode) -> None:
     """Something that F1 asks for has changed: if all of it holds now, the next firing waits for its turn."""
-    if place(worker):
+    if make_fireable(worker):
         worker.enqueue()
 
 
-def let_follow(core: Core, since: int) -> None:
+def queue_next_in_wave(core: Core, since: int) -> None:
     """R2: what one sending has enabled over sequential edges of its group goes before all else of the group.
 
     Depth first, in the order of the outputs and edges: so the last of them goes in first.
 
     Args:
       core: the run.
-      since: how many followers there were before the sending.
+      since: how many next_in_wave there were before the sending.
     """
-    followers = core.followers
-    core.followed += len(followers) - since
-    while len(followers) > since:
-        worker = followers.pop()
+    next_in_wave = core.next_in_wave
+    core.ran_next += len(next_in_wave) - since
+    while len(next_in_wave) > since:
+        worker = next_in_wave.pop()
         worker.push_next(worker)
 
 
-def must_wait(worker: Worker) -> bool:
+def must_wait(worker: RunningNode) -> bool:
     """F11 and A11: nothing starts before the rate allows it; the timer is set only when something would."""
     when = worker.rate.next_start
     if worker.is_source:
@@ -75,13 +75,13 @@ def must_wait(worker: Worker) -> bool:
     return True
 
 
-def unblock(worker: Worker, reason: int) -> None:
+def unblock(worker: RunningNode, reason: int) -> None:
     """Take one reason away and go on if it was the last."""
     if worker.allow(reason):
         _go_on(worker)
 
 
-def _go_on(worker: Worker) -> None:
+def _go_on(worker: RunningNode) -> None:
     consider(worker)
     if worker.calls and worker.blocked < NO_CALLS:
         worker.enqueue()
@@ -89,28 +89,28 @@ def _go_on(worker: Worker) -> None:
 
 def arrived(edge: Edge) -> None:
     """One more input of its target holds a token."""
-    target: Worker = edge.target
+    target: RunningNode = edge.target
     if edge.ended:  # an optional one that was absent since its END takes part again (F4)
-        target.core.upstairs.rewire(target)
+        target.core.rules.rewire(target)
         return
     barrier = target.inputs
     if barrier.arrive():
         if barrier.waiters is not None:
             barrier.notify()
-        if place(target):
-            if edge.follows:
-                target.follow()
+        if make_fireable(target):
+            if edge.depth_first:
+                target.run_next()
             else:
                 target.enqueue()
 
 
-def add_call(target: Worker, edge: Edge) -> None:
+def add_call(target: RunningNode, edge: Edge) -> None:
     """The newest token on the edge waits for a slot call (F9)."""
     target.expect_call(edge)
     if target.blocked >= NO_CALLS:
         return
-    if edge.follows:
-        target.follow()
+    if edge.depth_first:
+        target.run_next()
     else:
         target.enqueue()
 
@@ -128,7 +128,7 @@ def freed(edge: EventEdge) -> None:
         unblock(edge.source, FULL)
 
 
-def idle_again(worker: Worker, *, asked: bool = False) -> None:
+def idle_again(worker: RunningNode, *, asked: bool = False) -> None:
     """A firing, call or question is over: see what is next."""
     worker.rest()
     if (
@@ -136,21 +136,21 @@ def idle_again(worker: Worker, *, asked: bool = False) -> None:
         and worker.ending.pending
         and (not worker.outputs.missing or worker.blocked & DISABLED)
     ):
-        worker.core.upstairs.send_end(worker)  # its outputs became free during a slot call
-    if worker.on_idle is not None:
-        worker.let_others()
+        worker.core.rules.send_end(worker)  # its outputs became free during a slot call
+    if worker.idle_callbacks is not None:
+        worker.run_idle_callbacks()
         if worker.busy:
             return
     if not asked and worker.blocked & UNREADY:
         worker.allow(UNREADY)
     calls = bool(worker.calls) and worker.blocked < NO_CALLS
-    if worker.follows:
-        worker.follow_no_more()
-        if worker.placed or calls:  # what is left of the wave that has enabled it comes before all else (R2)
+    if worker.is_next:
+        worker.clear_next()
+        if worker.fireable or calls:  # what is left of the wave that has enabled it comes before all else (R2)
             if not worker.queued:
                 worker.enqueue_next()
             return
-    if worker.placed:
+    if worker.fireable:
         worker.enqueue()
     else:
         consider(worker)

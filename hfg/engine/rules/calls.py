@@ -7,12 +7,12 @@ from types import CoroutineType
 from typing import Any
 
 from hfg.base.token import Token
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.engine.rules import builtin_slots, sharing
 from hfg.engine.rules.agenda import idle_again
 from hfg.engine.rules.modifiers import derive_scopes, lose, receive, touch
 from hfg.engine.rules.releasing import make_room, release
-from hfg.engine.rules.sending import flush_automatic
+from hfg.engine.rules.sending import send_automatic
 from hfg.errors import UsageError
 from hfg.ports.edges import AnyEdge, SyncEdge
 from hfg.trace import CallEnded, CallOutcome, CallStarted, ParameterSet, TokenTaken
@@ -20,7 +20,7 @@ from hfg.trace import CallEnded, CallOutcome, CallStarted, ParameterSet, TokenTa
 __all__ = ["await_call", "call", "finish_call", "refuse_coroutine", "set_parameter"]
 
 
-def call(worker: Worker) -> None:
+def call(worker: RunningNode) -> None:
     """Take the oldest waiting slot token and run its handler (F9)."""
     core = worker.core
     edge = worker.take_call()
@@ -42,7 +42,7 @@ def call(worker: Worker) -> None:
         try:
             set_parameter(worker, name, token.value)
         except Exception as error:
-            core.upstairs.fail_call(worker, name, error)
+            core.rules.fail_call(worker, name, error)
         else:
             finish_call(worker, "done")
     elif edge.while_active and not worker.active:  # T4: it was about to be active, or it was when the token came
@@ -51,7 +51,7 @@ def call(worker: Worker) -> None:
         _run_handler(worker, name, token)
 
 
-def _receive(worker: Worker, edge: AnyEdge, modifier: int) -> None:
+def _receive(worker: RunningNode, edge: AnyEdge, modifier: int) -> None:
     """A6: what a call has taken acts, and by that on the subgraphs around."""
     if worker.scopes:
         touch(worker.core, worker.scopes)
@@ -61,7 +61,7 @@ def _receive(worker: Worker, edge: AnyEdge, modifier: int) -> None:
         lose(edge)
 
 
-def _run_handler(worker: Worker, name: str, token: Token[Any]) -> None:
+def _run_handler(worker: RunningNode, name: str, token: Token[Any]) -> None:
     """Run the handler of a slot, or do what every node has one for."""
     core = worker.core
     handler = worker.handlers.get(name)
@@ -85,7 +85,7 @@ def _run_handler(worker: Worker, name: str, token: Token[Any]) -> None:
     core.code.execute(worker, handler, (token,), done)
 
 
-def await_call(worker: Worker, name: str, coroutine: Coroutine[Any, Any, Any]) -> None:
+def await_call(worker: RunningNode, name: str, coroutine: Coroutine[Any, Any, Any]) -> None:
     """A handler that was called by a fast path turned out to wait."""
 
     def done(_result: object, error: BaseException | None) -> None:
@@ -94,7 +94,7 @@ def await_call(worker: Worker, name: str, coroutine: Coroutine[Any, Any, Any]) -
     worker.core.code.drive(worker, coroutine, done)
 
 
-def _over(worker: Worker, name: str, error: BaseException | None) -> None:
+def _over(worker: RunningNode, name: str, error: BaseException | None) -> None:
     """The handler's code is over."""
     if error is None:
         try:
@@ -104,10 +104,10 @@ def _over(worker: Worker, name: str, error: BaseException | None) -> None:
     if error is None:
         finish_call(worker, "done")
     else:
-        worker.core.upstairs.fail_call(worker, name, error)
+        worker.core.rules.fail_call(worker, name, error)
 
 
-def refuse_coroutine(worker: Worker, coroutine: Coroutine[Any, Any, Any]) -> TypeError:
+def refuse_coroutine(worker: RunningNode, coroutine: Coroutine[Any, Any, Any]) -> TypeError:
     """Close what came from a thread, where nothing can await it, and say what to do."""
     coroutine.close()
     return TypeError(
@@ -116,11 +116,11 @@ def refuse_coroutine(worker: Worker, coroutine: Coroutine[Any, Any, Any]) -> Typ
     )
 
 
-def finish_call(worker: Worker, outcome: CallOutcome) -> None:
+def finish_call(worker: RunningNode, outcome: CallOutcome) -> None:
     """The automatic events follow (A9), then the call is over: a sequential O->S token is processed (F6)."""
     core = worker.core
     derive_scopes(core)
-    flush_automatic(worker)
+    send_automatic(worker)
     if core.trace is not None:
         core.trace(CallEnded(core.now(), worker.path, worker.counts.calls, outcome))
     edge = worker.end_call()
@@ -132,12 +132,12 @@ def finish_call(worker: Worker, outcome: CallOutcome) -> None:
         core.sharing.sweep()
 
 
-def set_parameter(worker: Worker, name: str, value: object) -> None:
+def set_parameter(worker: RunningNode, name: str, value: object) -> None:
     """Give a parameter a value that came by a token.
 
     Raises:
       ValueError: it is out of its limits, or what the value itself raises: an error of the firing or call (X1).
     """
     worker.node._set_parameter(name, value)
-    if worker.core.seldom is not None:
-        worker.core.seldom(ParameterSet(worker.core.now(), worker.path, name, worker.node._parameters[name]))
+    if worker.core.trace_changes is not None:
+        worker.core.trace_changes(ParameterSet(worker.core.now(), worker.path, name, worker.node._parameters[name]))

@@ -1,8 +1,8 @@
 """Several firings of one node under way at once: how they go on, leave and end (rule F14).
 
-A firing takes its tokens as any other (`firing.fire`) and is then a *flight*. When its code is over, what it sends
-waits until the outputs are free and, where they are ordered, all that began earlier have left; it counts among those
-under way until then, which is the back-pressure of such a node. Stands on `errors`, `ending` and `retries`.
+A firing takes its tokens as any other (`firing.fire`) and is then a *concurrent firing*. When its code is over, what it
+sends waits until the outputs are free and, where they are ordered, all that began earlier have left. Until then it
+counts among those under way, which is the back-pressure of such a node. Stands on `errors`, `ending` and `retries`.
 """
 
 from __future__ import annotations
@@ -13,31 +13,32 @@ from types import CoroutineType
 from typing import Any
 
 from hfg.base.token import Marker, Token
-from hfg.engine.model import Flight, Flights
-from hfg.engine.model.current import current_flight
-from hfg.engine.model.worker import DISABLED, REMOVED, Worker
-from hfg.engine.rules import errors, firing
+from hfg.engine.model import ConcurrentFiring, ConcurrentFirings
+from hfg.engine.model.current import current_firing
+from hfg.engine.model.running_node import DISABLED, REMOVED, RunningNode
+from hfg.engine.rules import errors
+from hfg.engine.rules import firing as firings
 from hfg.engine.rules.agenda import consider, idle_again
 from hfg.engine.rules.calls import refuse_coroutine
 from hfg.engine.rules.ending import drain_left, drop_taken, ends_itself, gave_back
 from hfg.engine.rules.retries import try_again
-from hfg.engine.rules.sending import flush_automatic, put_outputs, send_end, trigger
+from hfg.engine.rules.sending import put_outputs, send_automatic, send_end, trigger
 from hfg.errors import Failure, FiringTimeout, QueueLimit, UsageError
 from hfg.trace import FiringEnded
 
-__all__ = ["abandon", "begin", "land", "time_out", "triggering", "write"]
+__all__ = ["abandon", "begin", "complete_firings", "time_out", "triggering", "write"]
 
 Emit = Callable[[Any, int | None, float | None], Any]
 
 
-def _flights(worker: Worker) -> Flights:
-    flights = worker.flights
-    assert flights is not None
-    return flights
+def _flights(worker: RunningNode) -> ConcurrentFirings:
+    concurrent = worker.concurrent
+    assert concurrent is not None
+    return concurrent
 
 
 def begin(
-    worker: Worker, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
+    worker: RunningNode, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
 ) -> None:
     """A firing has taken its tokens: it goes on beside those that are under way.
 
@@ -48,273 +49,273 @@ def begin(
       tokens: that it has taken.
       refused: why a parameter could not be set, so that it fails (P8); None: all could.
     """
-    flights = _flights(worker)
+    concurrent = _flights(worker)
     stamp = worker.stamp
     assert stamp is not None
     if kind == "end":  # behind all that are under way (F14)
         drop_taken(worker, edges, tokens)
-        flights.end(worker.counts.firings, stamp)
-        worker.crowd()
+        concurrent.end(worker.counts.firings, stamp)
+        worker.limit_concurrency()
     else:
-        flight = Flight(worker, worker.counts.firings, stamp)
-        flights.begin(flight)
-        worker.crowd()
+        firing = ConcurrentFiring(worker, worker.counts.firings, stamp)
+        concurrent.begin(firing)
+        worker.limit_concurrency()
         if kind == "process":
             _note_process(worker)
         if refused is not None:
-            _failed(flight, refused)
+            _failed(firing, refused)
         elif kind == "silent":
             worker.counts.add_silent()
-            flight.be_over("silent")
-            flights.over(flight)
+            firing.be_over("silent")
+            concurrent.over(firing)
         else:
-            _begin_process(flight, edges, tokens)
+            _begin_process(firing, edges, tokens)
     if worker.events_due is not None:
-        flush_automatic(worker)
+        send_automatic(worker)
     worker.leave()
     idle_again(worker)
-    land(worker)
+    complete_firings(worker)
 
 
-def _note_process(worker: Worker) -> None:
+def _note_process(worker: RunningNode) -> None:
     """What a firing whose function is to run means to the next one."""
-    firing.note_start(worker)
+    firings.note_start(worker)
     if not worker.inputs.missing:  # what the next firing asks for holds already: before the calls that come now (F9)
         consider(worker)
 
 
-def _begin_process(flight: Flight, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+def _begin_process(firing: ConcurrentFiring, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
     """F4(3): the function is run."""
-    worker = flight.worker
+    worker = firing.worker
     if len(worker.out_names) > len(worker.type.outputs):
-        flight.parameters = dict(worker.node._parameters)
+        firing.parameters = dict(worker.node._parameters)
     if worker.shape.remembers:
-        flight.remember(firing.values_of(edges, tokens))
-    flight.attempts.begin(tuple(firing.arguments_of(worker, edges, tokens)))
-    _attempt(flight)
+        firing.remember(firings.values_of(edges, tokens))
+    firing.attempts.begin(tuple(firings.arguments_of(worker, edges, tokens)))
+    _attempt(firing)
 
 
-def _attempt(flight: Flight) -> None:
+def _attempt(firing: ConcurrentFiring) -> None:
     """Run the function with what the firing has taken."""
-    worker = flight.worker
-    worker.core.code.execute_beside(flight, worker.process, flight.attempts.arguments, _when_done(flight))  # type: ignore[arg-type]
+    worker = firing.worker
+    worker.core.code.execute_concurrent(firing, worker.process, firing.attempts.arguments, _when_done(firing))  # type: ignore[arg-type]
 
 
-def _when_done(flight: Flight) -> Callable[[Any, BaseException | None], None]:
+def _when_done(firing: ConcurrentFiring) -> Callable[[Any, BaseException | None], None]:
     """What follows when this attempt is over."""
-    ticket = flight.ticket
+    ticket = firing.ticket
 
     def done(result: Any, error: BaseException | None) -> None:
-        if flight.ticket != ticket:
+        if firing.ticket != ticket:
             return  # X2: it came too late, the attempt was given up
-        if type(result) is CoroutineType and not flight.worker.group.threaded:
-            flight.worker.core.code.drive_beside(flight, result, done)
+        if type(result) is CoroutineType and not firing.worker.group.threaded:
+            firing.worker.core.code.drive_concurrent(firing, result, done)
             return
-        flight.in_time()
+        firing.in_time()
         if error is None:
-            _complete(flight, result)
-        elif ends_itself(flight.worker, error):
-            _found_end(flight)
+            _complete(firing, result)
+        elif ends_itself(firing.worker, error):
+            _found_end(firing)
         else:
-            _failed(flight, error)
+            _failed(firing, error)
 
     return done
 
 
-def _complete(flight: Flight, result: Any) -> None:
+def _complete(firing: ConcurrentFiring, result: Any) -> None:
     """The function ran to its end: what it has written leaves when its turn comes."""
-    worker = flight.worker
+    worker = firing.worker
     try:
         if type(result) is CoroutineType:
             raise refuse_coroutine(worker, result)
-        written = firing.merge(worker, result, flight.take_written(), flight.parameters)
+        written = firings.merge(worker, result, firing.take_written(), firing.parameters)
     except Exception as error:
-        _failed(flight, error)
+        _failed(firing, error)
         return
-    flight.be_over("done", written)
-    _over(flight)
+    firing.be_over("done", written)
+    _over(firing)
 
 
-def _found_end(flight: Flight) -> None:
+def _found_end(firing: ConcurrentFiring) -> None:
     """F2: the node has ended, behind those of its firings that are under way; what this one wrote leaves then (F4)."""
-    worker = flight.worker
-    flights = _flights(worker)
-    flights.forget(flight)
-    if flights.ending is None:
-        flights.end(flight.number, flight.stamp, flight.take_written())
+    worker = firing.worker
+    concurrent = _flights(worker)
+    concurrent.forget(firing)
+    if concurrent.ending is None:
+        concurrent.end(firing.number, firing.stamp, firing.take_written())
     else:  # it has found that twice
         worker.counts.add_end_firing()
-        _tell_end(flight, "ended")
-    worker.crowd()
+        _tell_end(firing, "ended")
+    worker.limit_concurrency()
     _rest(worker)
 
 
-def _failed(flight: Flight, error: BaseException) -> None:
+def _failed(firing: ConcurrentFiring, error: BaseException) -> None:
     """X1, for this firing by itself: it is tried again, or the node's policy decides."""
-    worker = flight.worker
+    worker = firing.worker
     if isinstance(error, QueueLimit):
-        worker.core.host.finish("failed", error)
+        worker.core.runtime.finish("failed", error)
         return
 
     def again() -> None:
-        flight.attempts.again()
-        _attempt(flight)
+        firing.attempts.again()
+        _attempt(firing)
 
-    flight.take_written()
-    if try_again(worker, flight.attempts, flight.number, error, again):
+    firing.take_written()
+    if try_again(worker, firing.attempts, firing.number, error, again):
         return
     worker.counts.add_failure()
-    problem = errors.as_node_error(worker, f"firing {flight.number}", error)
+    problem = errors.as_node_error(worker, f"firing {firing.number}", error)
     policy = errors.judge(worker, problem)
     if policy == "stop":
         return
-    flight.fail(problem, errors.outcome_of(problem), answers=policy != "disable")
+    firing.fail(problem, errors.outcome_of(problem), answers=policy != "disable")
     restarts = errors.begin_over(worker, policy)
-    _flights(worker).over(flight)
-    if not flight.answers:
-        _leave(flight)  # it sends nothing, so it need not wait for its turn
+    _flights(worker).over(firing)
+    if not firing.answers:
+        _leave(firing)  # it sends nothing, so it need not wait for its turn
         _let_leave(worker)
     errors.follow(worker, policy, restarts=restarts)
     _rest(worker)
 
 
-def time_out(flight: Flight) -> None:
+def time_out(firing: ConcurrentFiring) -> None:
     """X2: the attempt has taken longer than `max_duration_s`: it is given up, its late result ignored."""
-    worker = flight.worker
-    flight.in_time()
-    worker.core.code.interrupt_beside(flight)
+    worker = firing.worker
+    firing.in_time()
+    worker.core.code.interrupt_concurrent(firing)
     words = f"it took longer than max_duration_s = {worker.options.max_duration_s:g} s and was given up"
-    _failed(flight, FiringTimeout(worker.path, f"firing {flight.number}", words))
+    _failed(firing, FiringTimeout(worker.path, f"firing {firing.number}", words))
 
 
-def _over(flight: Flight) -> None:
+def _over(firing: ConcurrentFiring) -> None:
     """Its code has come to its end."""
-    _flights(flight.worker).over(flight)
-    _rest(flight.worker)
+    _flights(firing.worker).over(firing)
+    _rest(firing.worker)
 
 
-def _rest(worker: Worker) -> None:
+def _rest(worker: RunningNode) -> None:
     """Code of a firing is over: those leave whose turn it is, and who waits until none works has its turn."""
     if worker.core.sharing is not None:
         worker.core.sharing.sweep()
-    land(worker)
-    _flights(worker).let_others()
-    if worker.on_idle is not None and not worker.busy:
-        worker.let_others()
-        worker.crowd()
+    complete_firings(worker)
+    _flights(worker).run_idle_callbacks()
+    if worker.idle_callbacks is not None and not worker.busy:
+        worker.run_idle_callbacks()
+        worker.limit_concurrency()
         consider(worker)
 
 
-def land(worker: Worker) -> None:
+def complete_firings(worker: RunningNode) -> None:
     """Let those that are over leave whose turn it is; the end comes last."""
-    flights = _flights(worker)
-    if flights.leaving:
+    concurrent = _flights(worker)
+    if concurrent.leaving:
         return  # what it sends is processed at once: it goes on below
     _let_leave(worker)
     if worker.core.over:
         return
-    worker.crowd()
+    worker.limit_concurrency()
     consider(worker)
-    if flights.ending is not None:
+    if concurrent.ending is not None:
         _end(worker)
     elif worker.pending_end:
         _send_end(worker)
 
 
-def _let_leave(worker: Worker) -> None:
+def _let_leave(worker: RunningNode) -> None:
     """Let those that are over leave, as far as the outputs are free and the order allows."""
-    flights, core = _flights(worker), worker.core
-    if flights.leaving:
+    concurrent, core = _flights(worker), worker.core
+    if concurrent.leaving:
         return
-    flights.begin_leaving(True)
+    concurrent.begin_leaving(True)
     try:
         while not core.over:
             to_nobody = bool(worker.blocked & (DISABLED | REMOVED))
             if worker.outputs.missing and not to_nobody:
                 break
-            flight = flights.next_to_leave(to_nobody=to_nobody)
-            if flight is None:
+            firing = concurrent.next_to_leave(to_nobody=to_nobody)
+            if firing is None:
                 break
-            _leave(flight)
+            _leave(firing)
     finally:
-        flights.begin_leaving(False)
+        concurrent.begin_leaving(False)
 
 
-def _leave(flight: Flight) -> None:
+def _leave(firing: ConcurrentFiring) -> None:
     """Its outputs leave (F3), its events follow (A9), and it is over."""
-    worker = flight.worker
-    written = flight.take_written()
+    worker = firing.worker
+    written = firing.take_written()
     if worker.blocked & (DISABLED | REMOVED):
         written = None
-    elif flight.answers:
-        before = worker.send_as(flight.stamp)
+    elif firing.answers:
+        before = worker.send_as(firing.stamp)
         put_outputs(worker, written)
         worker.send_as(before)
-    _flights(worker).leave(flight)
-    if flight.failure is not None:
-        _tell(worker, "failed", Failure(flight.failure, flight.taken))
-    elif flight.outcome in ("done", "ended"):
-        _announce(flight, written)
-    _tell_end(flight, flight.outcome)
-    if flight.number != _flights(worker).end_number:
+    _flights(worker).leave(firing)
+    if firing.failure is not None:
+        _tell(worker, "failed", Failure(firing.failure, firing.taken))
+    elif firing.outcome in ("done", "ended"):
+        _announce(firing, written)
+    _tell_end(firing, firing.outcome)
+    if firing.number != _flights(worker).end_number:
         return
     assert worker.ending is not None
-    if worker.ending.given_up:
+    if worker.ending.is_dead_source:
         worker.ending.take_deferred()  # nobody is left who would hear END (R5)
     else:
-        worker.promise_end(flight.stamp)
+        worker.promise_end(firing.stamp)
 
 
-def _announce(flight: Flight, written: list[Any] | None) -> None:
+def _announce(firing: ConcurrentFiring, written: list[Any] | None) -> None:
     """A9: what has left is told where somebody asks, then that the firing is `processed`; each with its stamp."""
-    worker = flight.worker
+    worker = firing.worker
     for name, position in worker.shape.announced:
         entry = None if position is None or written is None else written[position]
-        if position is None and flight.outcome == "done":
+        if position is None and firing.outcome == "done":
             _tell(worker, name, None)
         elif entry is not None and type(entry[0]) is not Marker:
-            _tell(worker, name, Token(entry[0], 0, flight.stamp if entry[2] is None else entry[2]))
+            _tell(worker, name, Token(entry[0], 0, firing.stamp if entry[2] is None else entry[2]))
 
 
-def _tell(worker: Worker, name: str, value: Any) -> None:
+def _tell(worker: RunningNode, name: str, value: Any) -> None:
     """A9: an automatic event of this firing; those of a call that is under way follow that."""
     event = worker.events.get(name)
     if event is not None:
         trigger(event, value, stamp=None if type(value) is Token else worker.core.now(), extend_right=False)
 
 
-def _tell_end(flight: Flight, outcome: Any) -> None:
-    worker = flight.worker
+def _tell_end(firing: ConcurrentFiring, outcome: Any) -> None:
+    worker = firing.worker
     if worker.core.trace is None:
         return
     if outcome == "done" and worker.blocked & DISABLED:
         outcome = "abandoned"  # its outputs went nowhere (F10)
-    worker.core.trace(FiringEnded(worker.core.now(), worker.path, flight.number, outcome))
+    worker.core.trace(FiringEnded(worker.core.now(), worker.path, firing.number, outcome))
 
 
-def _end(worker: Worker) -> None:
+def _end(worker: RunningNode) -> None:
     """F4: all others have left, so the node ends; a slot call may be under way meanwhile."""
-    flights, core = _flights(worker), worker.core
-    if flights:
+    concurrent, core = _flights(worker), worker.core
+    if concurrent:
         return
-    flight = Flight(worker, flights.end_number, flights.take_ending())
-    flight.be_given(flights.end_written)
+    firing = ConcurrentFiring(worker, concurrent.end_number, concurrent.take_ending())
+    firing.be_given(concurrent.end_written)
     worker.counts.add_end_firing()
     worker.end()
     drain_left(worker.in_edges)
     hook = worker.node._hook("end")
-    flights.begin(flight)
+    concurrent.begin(firing)
     if hook is None:
-        _ended(flight, None, None)
+        _ended(firing, None, None)
     else:
-        core.code.execute_beside(flight, hook, (), partial(_ended, flight))
+        core.code.execute_concurrent(firing, hook, (), partial(_ended, firing))
 
 
-def _ended(flight: Flight, result: Any, error: BaseException | None) -> None:
+def _ended(firing: ConcurrentFiring, result: Any, error: BaseException | None) -> None:
     """Its `end()` is over: what that has written leaves when the outputs are free, and END behind it."""
-    worker = flight.worker
-    flights = _flights(worker)
-    written = flight.take_written()
+    worker = firing.worker
+    concurrent = _flights(worker)
+    written = firing.take_written()
     if error is None and result is not None:
         error = gave_back(result)
     if error is not None:
@@ -322,15 +323,15 @@ def _ended(flight: Flight, result: Any, error: BaseException | None) -> None:
         errors.fail(worker, "end()", error, answer=False)
     if written is not None and not any(entry is not None for entry in written):
         written = None
-    flight.be_over("ended" if error is None else "failed", written)
-    flights.over(flight)
+    firing.be_over("ended" if error is None else "failed", written)
+    concurrent.over(firing)
     if written is None:
-        flight.say_nothing()
-        _leave(flight)
+        firing.say_nothing()
+        _leave(firing)
     _rest(worker)
 
 
-def _send_end(worker: Worker) -> None:
+def _send_end(worker: RunningNode) -> None:
     """F4: END leaves as soon as the outputs are free, a slot call under way or not."""
     if worker.outputs.missing and not worker.blocked & DISABLED:
         return
@@ -339,51 +340,51 @@ def _send_end(worker: Worker) -> None:
     worker.send_as(before)
 
 
-def abandon(worker: Worker) -> None:
+def abandon(worker: RunningNode) -> None:
     """R4: the node has another code now, or is gone: what firings of the old one have to send goes nowhere."""
-    flights = _flights(worker)
-    for flight in flights:
-        if flight.outcome:
-            flights.leave(flight)
-            _tell_end(flight, "abandoned")
-    worker.crowd()
+    concurrent = _flights(worker)
+    for firing in concurrent:
+        if firing.outcome:
+            concurrent.leave(firing)
+            _tell_end(firing, "abandoned")
+    worker.limit_concurrency()
 
 
 # --- what the code of a firing does by itself -------------------------------------------------------------------------
 
 
-def write(worker: Worker, position: int, value: Any, activity: int | None, stamp: float | None) -> None:
+def write(worker: RunningNode, position: int, value: Any, activity: int | None, stamp: float | None) -> None:
     """A node's code writes to an output: it leaves with the firing whose code that is (F3).
 
     Raises:
       UsageError: it is that of no firing that goes on (also of a slot handler, F9), or writes twice.
     """
-    flight = current_flight.get()
-    if flight is None or flight.worker is not worker:
-        firing.write(worker, position, value, activity, stamp)  # in end(), or not at all
+    firing = current_firing.get()
+    if firing is None or firing.worker is not worker:
+        firings.write(worker, position, value, activity, stamp)  # in end(), or not at all
         return
-    if flight.outcome:
+    if firing.outcome:
         raise UsageError(
             f'output "{worker.path}.{worker.out_names[position]}" was written behind the end of its firing: outputs '
             "belong to process() and end(); trigger an event instead"
         )
-    entry = firing.entry_of(worker, position, flight.written, value, activity, stamp)
+    entry = firings.entry_of(worker, position, firing.written, value, activity, stamp)
     if entry is not None:
-        flight.write(position, entry)
+        firing.write(position, entry)
 
 
-def triggering(worker: Worker, emit: Emit) -> Emit:
+def triggering(worker: RunningNode, emit: Emit) -> Emit:
     """What triggers an event of a worker whose firings go on beside each other, or may be tried again.
 
     The firing is noted, for it cannot be repeated (X1), and its stamp goes along (T5).
     """
 
     def noted(value: Any, activity: int | None, stamp: float | None) -> Any:
-        flight = current_flight.get()
-        if flight is not None and flight.worker is worker:
-            flight.attempts.has_triggered()
-            if stamp is None and type(value) is not Token and not flight.outcome:
-                stamp = flight.stamp
+        firing = current_firing.get()
+        if firing is not None and firing.worker is worker:
+            firing.attempts.has_triggered()
+            if stamp is None and type(value) is not Token and not firing.outcome:
+                stamp = firing.stamp
         elif worker.attempts is not None:
             worker.attempts.has_triggered()
         return emit(value, activity, stamp)

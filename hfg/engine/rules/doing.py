@@ -11,9 +11,9 @@ from functools import partial
 
 from hfg.engine.model import Doing, Task, Tasks
 from hfg.engine.model.current import current_task
-from hfg.engine.model.worker import BACKOFF, DISABLED, TORN_DOWN, Worker
+from hfg.engine.model.running_node import BACKOFF, DISABLED, TORN_DOWN, RunningNode
 from hfg.engine.rules.modifiers import derive_scopes
-from hfg.engine.rules.sending import trigger_beside
+from hfg.engine.rules.sending import trigger_from_task
 from hfg.trace import DoEnded, DoOutcome, DoStarted
 
 __all__ = ["afresh", "begun", "entered", "entering", "go_on", "has", "leave", "over"]
@@ -21,31 +21,31 @@ __all__ = ["afresh", "begun", "entered", "entering", "go_on", "has", "leave", "o
 _NOT_NOW = DISABLED | BACKOFF | TORN_DOWN
 
 
-def has(worker: Worker) -> bool:
+def has(worker: RunningNode) -> bool:
     """Whether its node has a do-activity."""
     return worker.node is not None and worker.scope is None and "do" in worker.type.hooks
 
 
-def _of(worker: Worker) -> Doing:
+def _of(worker: RunningNode) -> Doing:
     if worker.tasks is None:
         worker.start_tasks(Tasks(worker))
-        worker.core.upstairs.bind_ports(worker)  # what it sends is looked at from here on
+        worker.core.rules.bind_ports(worker)  # what it sends is looked at from here on
     doing: Doing = worker.tasks.doing
     return doing
 
 
-def entering(worker: Worker) -> None:
+def entering(worker: RunningNode) -> None:
     """A(v) has become 1; its `on_activated` comes first."""
     _of(worker).enter()
 
 
-def entered(worker: Worker) -> None:
+def entered(worker: RunningNode) -> None:
     """Its `on_activated` is over."""
     _of(worker).entered()
     go_on(worker)
 
 
-def leave(worker: Worker) -> None:
+def leave(worker: RunningNode) -> None:
     """A(v) has become 0; one that does not end at once sees nothing of the next activity."""
     doing = _of(worker)
     doing.leave()
@@ -57,31 +57,31 @@ def _is_current(task: Task) -> bool:
     return current_task.get() is task
 
 
-def afresh(worker: Worker) -> None:
+def afresh(worker: RunningNode) -> None:
     """The node has been set up anew: if it is active its do-activity begins anew too."""
     if has(worker):
         _of(worker).be_due(worker.active)
         go_on(worker)
 
 
-def go_on(worker: Worker) -> None:
+def go_on(worker: RunningNode) -> None:
     """Begin the do-activity if it is due, and neither the last one nor the state of its node keeps it back."""
     tasks, core = worker.tasks, worker.core
     if not tasks.doing.may_begin() or tasks.ending or not worker.lifecycle.is_up or worker.lifecycle.opening:
         return
     if worker.blocked & _NOT_NOW or core.over:
         return
-    core.host.start_task(worker, worker.node.do(), tasks.doing)
+    core.runtime.start_task(worker, worker.node.do(), tasks.doing)
 
 
-def begun(worker: Worker) -> None:
+def begun(worker: RunningNode) -> None:
     """Its first step is about to be taken."""
     core = worker.core
-    if core.seldom is not None:
-        core.seldom(DoStarted(core.now(), worker.path))
+    if core.trace_changes is not None:
+        core.trace_changes(DoStarted(core.now(), worker.path))
 
 
-def over(worker: Worker, task: Task, result: object, error: BaseException | None) -> BaseException | None:
+def over(worker: RunningNode, task: Task, result: object, error: BaseException | None) -> BaseException | None:
     """It has ended: say so, and with what it returned if it came to its end by itself; gives back how it failed."""
     core = worker.core
     worker.tasks.doing.over()
@@ -89,8 +89,10 @@ def over(worker: Worker, task: Task, result: object, error: BaseException | None
     outcome: DoOutcome = "completed" if error is None else "failed"
     if task.cancelled and isinstance(error, asyncio.CancelledError | None):
         outcome = "cancelled"
-    if core.seldom is not None and not core.over and task.carrier is not None:  # else it was cancelled before it began
-        core.seldom(DoEnded(core.now(), worker.path, outcome))
+    if (
+        core.trace_changes is not None and not core.over and task.eager_task is not None
+    ):  # else it was cancelled before it began
+        core.trace_changes(DoEnded(core.now(), worker.path, outcome))
     if outcome == "completed":
         try:
             _complete(worker, result)
@@ -99,8 +101,8 @@ def over(worker: Worker, task: Task, result: object, error: BaseException | None
     return error if outcome == "failed" else None
 
 
-def _complete(worker: Worker, result: object) -> None:
+def _complete(worker: RunningNode, result: object) -> None:
     event = worker.events.get("completed")
     if event is not None:
-        trigger_beside(event, result)
+        trigger_from_task(event, result)
         derive_scopes(worker.core)

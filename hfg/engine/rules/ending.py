@@ -10,11 +10,11 @@ from functools import partial
 from typing import Any
 
 from hfg.base.token import Marker, Token
-from hfg.engine.model.worker import DISABLED, Worker
+from hfg.engine.model.running_node import DISABLED, RunningNode
 from hfg.engine.rules.agenda import freed, idle_again
 from hfg.engine.rules.modifiers import derive_scopes, touch
 from hfg.engine.rules.releasing import release
-from hfg.engine.rules.sending import announce, flush_automatic, put_outputs, send_end
+from hfg.engine.rules.sending import announce, put_outputs, send_automatic, send_end
 from hfg.errors import EndOfStream, shown
 from hfg.ports.edges import EventEdge
 from hfg.trace import FiringEnded, TokenDrained, TokenDropped
@@ -22,20 +22,20 @@ from hfg.trace import FiringEnded, TokenDrained, TokenDropped
 __all__ = ["drain_left", "drop_taken", "end", "end_itself", "ends_itself", "gave_back"]
 
 
-def ends_itself(worker: Worker, error: BaseException | None) -> bool:
+def ends_itself(worker: RunningNode, error: BaseException | None) -> bool:
     """F2: what the process function has raised is no error, but says that the node has ended."""
     return isinstance(error, EndOfStream) or (
         worker.is_source and isinstance(error, StopIteration | StopAsyncIteration)  # its generator has returned
     )
 
 
-def end_itself(worker: Worker) -> None:
+def end_itself(worker: RunningNode) -> None:
     """F2: end amid a firing of its own; what that has written before leaves with what `end()` writes (F4)."""
     worker.execution.close_generator()  # nothing is left to close
     end(worker, (), ())
 
 
-def end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+def end(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
     """F4(1): `end()` is called, what it writes leaves as one full firing, END follows (F12 begins here)."""
     core = worker.core
     drop_taken(worker, edges, tokens)
@@ -56,7 +56,7 @@ def end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> N
     core.code.execute(worker, hook, (), lambda result, error: _ended(worker, result, error))
 
 
-def drop_taken(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+def drop_taken(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
     """F4(1): values that the ending firing has taken are for nobody."""
     core = worker.core
     for edge, token in zip(edges, tokens, strict=True):
@@ -80,7 +80,7 @@ def drain_left(edges: Sequence[Any]) -> None:
     joined = [edge for edge in edges if edge.joins()]
     drained = [edge for edge in joined if edge.untaken]
     for edge in drained:
-        worker: Worker = edge.target
+        worker: RunningNode = edge.target
         core = worker.core
         for token in edge.clear():
             edge.count_drained()
@@ -91,10 +91,10 @@ def drain_left(edges: Sequence[Any]) -> None:
     for edge in drained:
         if type(edge) is EventEdge:
             freed(edge)
-    release([edge for edge in joined if type(edge) is not EventEdge and edge.held], drained=drained)
+    release([edge for edge in joined if type(edge) is not EventEdge and edge.unprocessed], drained=drained)
 
 
-def _ended(worker: Worker, result: object, error: BaseException | None) -> None:
+def _ended(worker: RunningNode, result: object, error: BaseException | None) -> None:
     core = worker.core
     worker.be_busy("firing")
     written = worker.take_written()
@@ -102,20 +102,20 @@ def _ended(worker: Worker, result: object, error: BaseException | None) -> None:
         error = gave_back(result)
     if error is not None:
         written = None
-        then = partial(flush_automatic, worker)  # that it has failed is told before it may be disabled
-        worker.core.upstairs.fail(worker, "end()", error, answer=False, then=then)
+        then = partial(send_automatic, worker)  # that it has failed is told before it may be disabled
+        worker.core.rules.fail(worker, "end()", error, answer=False, then=then)
     if written is not None and any(entry is not None for entry in written):
         put_outputs(worker, written)
         announce(worker, written, processed=False)
-    flush_automatic(worker)
+    send_automatic(worker)
     if core.trace is not None:
         core.trace(FiringEnded(core.now(), worker.path, worker.counts.firings, "ended" if error is None else "failed"))
-    worker.be_over()
+    worker.begin_releasing()
     release(worker.release_early())
     stamp = worker.stamp
     worker.leave()  # the firing is over; END is not part of it (A3)
     assert worker.ending is not None
-    if worker.ending.given_up:  # amid a firing, and that is over now: nobody is left who would hear END (R5)
+    if worker.ending.is_dead_source:  # amid a firing, and that is over now: nobody is left who would hear END (R5)
         worker.ending.take_deferred()
     elif worker.outputs.missing and not worker.blocked & DISABLED:
         worker.promise_end(stamp)

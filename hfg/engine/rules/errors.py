@@ -11,11 +11,11 @@ from collections.abc import Callable
 from hfg.base.frames import users_part
 from hfg.base.logs import node_log
 from hfg.engine.model.iteration import amid_element
-from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, Worker
-from hfg.engine.rules import calls, firing, lifecycle
+from hfg.engine.model.running_node import BACKOFF, BETWEEN_FIRINGS, RunningNode
+from hfg.engine.rules import calls, firing, node_lifecycle
 from hfg.engine.rules.modifiers import automatic, report_error
 from hfg.engine.rules.retries import retry
-from hfg.engine.rules.sending import flush_automatic, put_outputs
+from hfg.engine.rules.sending import put_outputs, send_automatic
 from hfg.errors import EndOfStream, Failure, FiringTimeout, NodeError, QueueLimit, in_words, shown
 from hfg.ports.edges import EventEdge
 from hfg.trace import FiringOutcome
@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 
-def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:
+def as_node_error(worker: RunningNode, what: str, error: BaseException) -> NodeError:
     """Wrap what was raised so that it names the path and the firing (X1)."""
     if isinstance(error, NodeError):
         return error
@@ -61,7 +61,7 @@ def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:
     return problem
 
 
-def _wrong_value(worker: Worker, error: Exception) -> str:
+def _wrong_value(worker: RunningNode, error: Exception) -> str:
     """Say which value the code was given that its input was never declared for: the fault of whoever has sent it.
 
     The values are looked up where the code failed, so that a firing that does not fail keeps none of them.
@@ -88,11 +88,11 @@ def _wrong_value(worker: Worker, error: Exception) -> str:
 
 
 def fail(
-    worker: Worker, what: str, error: BaseException, *, answer: bool, then: Callable[[], None] | None = None
+    worker: RunningNode, what: str, error: BaseException, *, answer: bool, then: Callable[[], None] | None = None
 ) -> None:
     """A firing (`answer`: it still owes its outputs) or something beside one has failed; see `apply_policy`."""
     if isinstance(error, QueueLimit):
-        worker.core.host.finish("failed", error)
+        worker.core.runtime.finish("failed", error)
         return
     if answer and retry(worker, error):
         return
@@ -100,10 +100,10 @@ def fail(
     apply_policy(worker, as_node_error(worker, what, error), answer=answer, then=then)
 
 
-def fail_beside(worker: Worker, what: str, error: BaseException) -> None:
+def fail_beside(worker: RunningNode, what: str, error: BaseException) -> None:
     """A task of the node has failed, perhaps amid a firing, which goes on; the node's policy decides (X1)."""
     if isinstance(error, QueueLimit):
-        worker.core.host.finish("failed", error)
+        worker.core.runtime.finish("failed", error)
         return
     worker.counts.add_failure()
     problem = as_node_error(worker, what, error)
@@ -112,26 +112,26 @@ def fail_beside(worker: Worker, what: str, error: BaseException) -> None:
         return
     automatic(worker, "failed", Failure(problem, {}))
     restarts = begin_over(worker, policy)
-    if worker.busy in AMID_NOTHING:  # else it follows the firing or call under way (A9)
-        flush_automatic(worker)
+    if worker.busy in BETWEEN_FIRINGS:  # else it follows the firing or call under way (A9)
+        send_automatic(worker)
     follow(worker, policy, restarts=restarts)
 
 
-def fail_call(worker: Worker, slot: str, error: BaseException) -> None:
+def fail_call(worker: RunningNode, slot: str, error: BaseException) -> None:
     """A slot call has failed: it owes no outputs, so with every policy but `stop` it is only counted."""
     worker.counts.add_failure(of_call=True)
     problem = as_node_error(worker, f"slot {slot}, call {worker.counts.calls}", error)
     policy = _policy(worker, problem)
     report_error(worker, problem.what, in_words(error), policy)
     if policy == "stop":
-        worker.core.host.finish("failed", problem)
+        worker.core.runtime.finish("failed", problem)
         return
     _log(worker, problem, f'the call is only counted (on_error="{policy}")')
     worker.core.errors.append(problem)
     calls.finish_call(worker, "failed")
 
 
-def _log(worker: Worker, problem: NodeError, consequence: str) -> None:
+def _log(worker: RunningNode, problem: NodeError, consequence: str) -> None:
     """Tell of an error that ends nothing as it happens, with the frames of the user's code (X1)."""
     cause = problem.__cause__
     node_log(worker.path).error(
@@ -142,14 +142,14 @@ def _log(worker: Worker, problem: NodeError, consequence: str) -> None:
     )
 
 
-def _policy(worker: Worker, problem: NodeError) -> str:
+def _policy(worker: RunningNode, problem: NodeError) -> str:
     """Who ends a task or the program on purpose has raised no error that a policy could get over."""
     if worker.options is None or not isinstance(problem.__cause__, Exception | None):
         return "stop"
     return worker.options.on_error  # type: ignore[no-any-return]
 
 
-def judge(worker: Worker, problem: NodeError) -> str:
+def judge(worker: RunningNode, problem: NodeError) -> str:
     """X1: what the node's policy says is told to those who listen; "stop" has ended the run."""
     core = worker.core
     policy = _policy(worker, problem)
@@ -157,7 +157,7 @@ def judge(worker: Worker, problem: NodeError) -> str:
         policy = "stop"
     report_error(worker, problem.what, in_words(problem.__cause__ or problem), policy)
     if policy == "stop":
-        core.host.finish("failed", problem)
+        core.runtime.finish("failed", problem)
     else:
         _log(worker, problem, f'{_WHAT_FOLLOWS[policy]} (on_error="{policy}")')
         core.errors.append(problem)
@@ -169,7 +169,7 @@ def outcome_of(problem: NodeError) -> FiringOutcome:
     return "abandoned" if isinstance(problem, FiringTimeout) else "failed"
 
 
-def begin_over(worker: Worker, policy: str) -> bool:
+def begin_over(worker: RunningNode, policy: str) -> bool:
     """X1: whether the node is to be restarted, and that is not under way already; from here on nothing of it begins."""
     restarts = policy == "restart" and not worker.blocked & BACKOFF
     if restarts:
@@ -177,15 +177,17 @@ def begin_over(worker: Worker, policy: str) -> bool:
     return restarts
 
 
-def follow(worker: Worker, policy: str, *, restarts: bool) -> None:
+def follow(worker: RunningNode, policy: str, *, restarts: bool) -> None:
     """X1: what becomes of the node when its failed firing is over."""
     if policy == "disable":
-        lifecycle.disable(worker)
+        node_lifecycle.disable(worker)
     elif restarts:
-        lifecycle.restart(worker, worker.options.restart_backoff_s * 2 ** (worker.counts.restarts - 1))
+        node_lifecycle.restart(worker, worker.options.restart_backoff_s * 2 ** (worker.counts.restarts - 1))
 
 
-def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Callable[[], None] | None = None) -> None:
+def apply_policy(
+    worker: RunningNode, problem: NodeError, *, answer: bool, then: Callable[[], None] | None = None
+) -> None:
     """X1: the node's policy decides; where no answer is owed `then` comes before a node is disabled or restarted."""
     policy = judge(worker, problem)
     worker.take_written()
@@ -200,11 +202,11 @@ def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Call
     elif then is not None:
         then()
     elif not worker.busy:
-        flush_automatic(worker)
+        send_automatic(worker)
     follow(worker, policy, restarts=restarts)
 
 
-def time_out(worker: Worker) -> None:
+def time_out(worker: RunningNode) -> None:
     """X2: the firing has taken longer than `max_duration_s`: it is given up, its late result ignored."""
     worker.give_up_firing()
     limit = worker.options.max_duration_s
@@ -219,10 +221,10 @@ def time_out(worker: Worker) -> None:
 
 def operator_failed(edge: EventEdge, error: BaseException) -> None:
     """An operator on the edge raised: the consumer's `on_error` decides (P9, X1)."""
-    target: Worker = edge.target
+    target: RunningNode = edge.target
     problem = NodeError(target.path, f'an operator on edge "{edge.label}"{amid_element(target)}', error)
     problem.__cause__ = error
-    if target in (target.core.current, target.core.speaker):  # it has triggered into itself: that is over first
+    if target in (target.core.current, target.core.running_node):  # it has triggered into itself: that is over first
         target.core.after(0.0, lambda: apply_policy(target, problem, answer=False))
     else:
         apply_policy(target, problem, answer=False)

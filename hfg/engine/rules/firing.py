@@ -14,14 +14,14 @@ from typing import Any
 from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.base.values import own_copy
 from hfg.engine.model.rate import SAME_MOMENT_S
-from hfg.engine.model.worker import DISABLED, NO_CALLS, UNREADY, Worker
+from hfg.engine.model.running_node import DISABLED, NO_CALLS, UNREADY, RunningNode
 from hfg.engine.rules import sharing
 from hfg.engine.rules.agenda import consider, idle_again
 from hfg.engine.rules.calls import call, refuse_coroutine, set_parameter
 from hfg.engine.rules.ending import end, end_itself, ends_itself
 from hfg.engine.rules.modifiers import derive_scopes, receive, touch
 from hfg.engine.rules.releasing import make_room, release
-from hfg.engine.rules.sending import announce, flush_automatic, put_outputs, put_value, unwrapped
+from hfg.engine.rules.sending import announce, put_outputs, put_value, send_automatic, unwrapped
 from hfg.engine.rules.wiring import rewire
 from hfg.errors import EndOfStream, UsageError
 from hfg.ports.edges import VALUE, AnyEdge
@@ -49,13 +49,13 @@ _OF_ITS_OWN_KIND = frozenset({Token, CoroutineType})
 """What a function may give back that does not simply leave: a token passed on, code that is still to be awaited."""
 
 
-def step(worker: Worker) -> None:
+def step(worker: RunningNode) -> None:
     """Do the next piece of work on the agenda of a worker that was taken from its run queue."""
     worker.dequeued()
     if worker.busy:
         return
     calls = worker.calls
-    if worker.placed and not (calls and worker.ahead):
+    if worker.fireable and not (calls and worker.calls_before):
         if worker.ready_hook is None:
             fire(worker)
         else:
@@ -63,10 +63,10 @@ def step(worker: Worker) -> None:
     elif calls and worker.blocked < NO_CALLS:
         call(worker)
     else:
-        worker.follow_no_more()  # what it stood there for was taken from it meanwhile (F10, R4)
+        worker.clear_next()  # what it stood there for was taken from it meanwhile (F10, R4)
 
 
-def _ask_ready(worker: Worker) -> None:
+def _ask_ready(worker: RunningNode) -> None:
     """F1: the node's own `ready()` is asked last."""
     hook = worker.ready_hook
     assert hook is not None
@@ -74,21 +74,21 @@ def _ask_ready(worker: Worker) -> None:
 
     def answered(ready: object, error: BaseException | None) -> None:
         worker.rest()
-        if isinstance(error, EndOfStream) and worker.is_source and worker.placed:
+        if isinstance(error, EndOfStream) and worker.is_source and worker.fireable:
             worker.begin_firing()
             end_itself(worker)
-        elif isinstance(error, EndOfStream) and worker.placed:
+        elif isinstance(error, EndOfStream) and worker.fireable:
             fire(worker, ends=True)
         elif error is not None:  # no answer is no: else it would be asked, and fail, without end
             worker.block(UNREADY)
-            worker.core.upstairs.fail(worker, "ready()", error, answer=False)
+            worker.core.rules.fail(worker, "ready()", error, answer=False)
             if not worker.busy:  # else its restart has begun
                 idle_again(worker, asked=True)
-        elif ready and worker.placed and worker.on_idle is None:
+        elif ready and worker.fireable and worker.idle_callbacks is None:
             fire(worker)
-        elif ready and worker.placed:  # an edit was faster, and asks to be before the firing
+        elif ready and worker.fireable:  # an edit was faster, and asks to be before the firing
             idle_again(worker)
-        elif worker.placed:
+        elif worker.fireable:
             worker.block(UNREADY)
             idle_again(worker, asked=True)
         else:
@@ -97,7 +97,7 @@ def _ask_ready(worker: Worker) -> None:
     worker.core.code.execute(worker, hook, (), answered)
 
 
-def fire(worker: Worker, *, ends: bool = False) -> None:
+def fire(worker: RunningNode, *, ends: bool = False) -> None:
     """Take one token from every live input and decide by F4 what becomes of them; `ends`: its `ready()` ends it."""
     core = worker.core
     shape = worker.shape
@@ -120,19 +120,19 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
         for edge, token in zip(edges, tokens, strict=True):
             core.trace(TokenTaken(now, edge.label, token))
     _free_places(worker, edges)
-    if worker.flights is None:
+    if worker.concurrent is None:
         _note(worker, kind)
     if modifiers:
         _receive(worker, modifiers)
     refused = _set_parameters(worker, edges, tokens)
-    if worker.flights is not None:
-        core.upstairs.begin_beside(worker, kind, edges, tokens, refused)
+    if worker.concurrent is not None:
+        core.rules.begin_concurrent(worker, kind, edges, tokens, refused)
     elif kind == "end":
         end(worker, edges, tokens)
     elif refused is not None:
         if worker.attempts is not None:
             worker.attempts.begin_none()
-        core.upstairs.fail(worker, f"firing {worker.counts.firings}", refused, answer=True)
+        core.rules.fail(worker, f"firing {worker.counts.firings}", refused, answer=True)
     elif kind == "silent":
         worker.counts.add_silent()
         put_outputs(worker, None)
@@ -141,7 +141,7 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
         _run_process(worker, edges, tokens)
 
 
-def _note(worker: Worker, kind: FiringKind) -> None:
+def _note(worker: RunningNode, kind: FiringKind) -> None:
     """What a firing of that kind means to the next one."""
     if kind == "process":
         note_start(worker)
@@ -149,17 +149,17 @@ def _note(worker: Worker, kind: FiringKind) -> None:
         _place_next(worker)
 
 
-def note_start(worker: Worker) -> None:
+def note_start(worker: RunningNode) -> None:
     """F11, A11: a firing whose function runs begins now."""
     rate_hz = worker.options.max_rate_hz
     if rate_hz:
         worker.rate.start(worker.core.now(), rate_hz)
     worker.rate.start_gated(worker.core.now())
     if worker.paced:
-        worker.unplace()  # what an input that has ended gave a place to is held by the rate from now on
+        worker.drop_firing()  # what an input that has ended gave a place to is held by the rate from now on
 
 
-def _fire_plainly(worker: Worker) -> None:
+def _fire_plainly(worker: RunningNode) -> None:
     """The same where the wiring leaves nothing to decide (`Shape.plain`) and no marker lies before the worker.
 
     All that is taken are values, one for each input, so the function is run (F4); nobody listens.
@@ -192,7 +192,7 @@ def _fire_plainly(worker: Worker) -> None:
         _run_process(worker, worker.live_inputs, tokens)
 
 
-def _free_places(worker: Worker, edges: Sequence[Any]) -> None:
+def _free_places(worker: RunningNode, edges: Sequence[Any]) -> None:
     """What has been taken gives room on edges where that is enough (F5 pipelined, F6)."""
     for edge in edges:
         make_room(edge)
@@ -200,7 +200,7 @@ def _free_places(worker: Worker, edges: Sequence[Any]) -> None:
             rewire(worker)
 
 
-def _receive(worker: Worker, modifiers: Sequence[int]) -> None:
+def _receive(worker: RunningNode, modifiers: Sequence[int]) -> None:
     """A6: what a firing has taken acts, and by that on the subgraphs around."""
     if worker.scopes:
         touch(worker.core, worker.scopes)
@@ -208,7 +208,7 @@ def _receive(worker: Worker, modifiers: Sequence[int]) -> None:
     derive_scopes(worker.core)
 
 
-def _place_next(worker: Worker) -> None:
+def _place_next(worker: RunningNode) -> None:
     """What the next firing asks for may hold already: then it has its place before the calls that come now (F9).
 
     Those are the calls that come of what was taken, too: of the activity that it brings to subgraphs around (A6, G2).
@@ -233,7 +233,7 @@ def _newest_stamp(tokens: Sequence[Token[Any]], now: float) -> float:
     return max(values or [token.stamp for token in tokens], default=now)
 
 
-def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> FiringKind:
+def _kind(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> FiringKind:
     """F4: what becomes of a firing; a closed gate makes it silent (A11)."""
     for edge, token in zip(edges, tokens, strict=True):
         edge.end(token.value is END)
@@ -258,19 +258,19 @@ def _lacks_values(edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> bool:
     return absent
 
 
-def _is_held_by_gate(worker: Worker) -> bool:
+def _is_held_by_gate(worker: RunningNode) -> bool:
     """A11: a gate over it is closed, and no throttled firing is due; sources rest instead."""
     return not worker.is_source and any(
         not gate.state.active and not _idle_turn(worker, gate.idle_rate_hz) for gate in worker.gates_over
     )
 
 
-def _idle_turn(worker: Worker, idle_rate_hz: float | None) -> bool:
+def _idle_turn(worker: RunningNode, idle_rate_hz: float | None) -> bool:
     """A11: a throttled node runs its function as often as the idle rate allows."""
     return idle_rate_hz is not None and worker.core.now() + SAME_MOMENT_S >= worker.rate.gate_next + 1.0 / idle_rate_hz
 
 
-def _all_ended(worker: Worker, taking_part: Sequence[Any]) -> bool:
+def _all_ended(worker: RunningNode, taking_part: Sequence[Any]) -> bool:
     """F4(1): every live input has ended; edges with initial tokens do not count, and one other must have.
 
     Args:
@@ -282,7 +282,7 @@ def _all_ended(worker: Worker, taking_part: Sequence[Any]) -> bool:
     return bool(counted) and all(edge.ended for edge in counted)
 
 
-def _set_parameters(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> Exception | None:
+def _set_parameters(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> Exception | None:
     """P8: a token sets the parameter when it is taken, also in a silent firing; gives why one cannot be set."""
     for edge, token in zip(edges, tokens, strict=True):
         if edge.target_kind == "parameter" and type(token.value) is not Marker:
@@ -293,7 +293,7 @@ def _set_parameters(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token
     return None
 
 
-def arguments_of(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> list[Any]:
+def arguments_of(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> list[Any]:
     """One argument per declared input: the value, the token if asked for, the default if absent (P6)."""
     arguments = list(worker.unset)
     for edge, token in zip(edges, tokens, strict=True):
@@ -311,14 +311,14 @@ def values_of(edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> dict[str, A
     }
 
 
-def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+def _run_process(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
     arguments = tuple(arguments_of(worker, edges, tokens))
     if worker.attempts is not None:
         worker.attempts.begin(arguments)
     if worker.shape.remembers:
         worker.execution.remember(values_of(edges, tokens))
     if worker.iteration is not None:
-        worker.core.upstairs.iterate(worker, arguments)
+        worker.core.rules.iterate(worker, arguments)
         return
     kind = worker.type.process_kind
     call: Any = worker.process
@@ -331,7 +331,7 @@ def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[An
     worker.core.code.execute(worker, call, arguments, when_done(worker))
 
 
-def _open(worker: Worker, step: Callable[[Any], object]) -> object:
+def _open(worker: RunningNode, step: Callable[[Any], object]) -> object:
     """Begin a source that is a generator, or a function that gives back an iterator, and take its first value."""
     iterator = worker.process()  # type: ignore[misc]  # a source has one
     method = "__next__" if step is next else "__anext__"
@@ -346,7 +346,7 @@ def _open(worker: Worker, step: Callable[[Any], object]) -> object:
     return step(iterator)
 
 
-def when_done(worker: Worker) -> Callable[[Any, BaseException | None], None]:
+def when_done(worker: RunningNode) -> Callable[[Any, BaseException | None], None]:
     """What follows when the process function is over."""
     ticket = worker.ticket
 
@@ -358,12 +358,12 @@ def when_done(worker: Worker) -> Callable[[Any, BaseException | None], None]:
         elif ends_itself(worker, error):
             end_itself(worker)
         else:
-            worker.core.upstairs.fail(worker, f"firing {worker.counts.firings}", error, answer=True)
+            worker.core.rules.fail(worker, f"firing {worker.counts.firings}", error, answer=True)
 
     return done
 
 
-def complete_firing(worker: Worker, result: object) -> None:
+def complete_firing(worker: RunningNode, result: object) -> None:
     """The process function ran to its end: its outputs leave together (F3)."""
     if type(result) is CoroutineType and not worker.group.threaded:
         # a plain function has called an async one, or a generator has yielded a call of one
@@ -378,7 +378,7 @@ def complete_firing(worker: Worker, result: object) -> None:
                 raise refuse_coroutine(worker, result)
             written = merge(worker, result, worker.written)
         except Exception as error:
-            worker.core.upstairs.fail(worker, f"firing {worker.counts.firings}", error, answer=True)
+            worker.core.rules.fail(worker, f"firing {worker.counts.firings}", error, answer=True)
             return
         put_outputs(worker, written)
     if worker.shape.announced:
@@ -389,7 +389,7 @@ def complete_firing(worker: Worker, result: object) -> None:
 
 
 def merge(
-    worker: Worker, result: object, written: list[Any] | None, parameters: dict[str, Any] | None = None
+    worker: RunningNode, result: object, written: list[Any] | None, parameters: dict[str, Any] | None = None
 ) -> list[Any] | None:
     """Join what was returned with what was sent; both for one output is writing twice (F3).
 
@@ -420,7 +420,7 @@ def merge(
     return written
 
 
-def _check_values(worker: Worker, written: list[Any] | None) -> None:
+def _check_values(worker: RunningNode, written: list[Any] | None) -> None:
     """In debug mode: what leaves is of its output's type, and what was taken is as it was (T1)."""
     sharing.need_unchanged(worker)
     for position, (name, spec) in enumerate(worker.type.outputs.items() if written is not None else ()):
@@ -434,7 +434,7 @@ def _check_values(worker: Worker, written: list[Any] | None) -> None:
         sharing.need_unwritten(worker, name, entry[0])
 
 
-def _add_parameters(worker: Worker, written: list[Any] | None, parameters: dict[str, Any]) -> list[Any]:
+def _add_parameters(worker: RunningNode, written: list[Any] | None, parameters: dict[str, Any]) -> list[Any]:
     """P8: a connected parameter sends its value with each firing that is not silent."""
     if written is None:
         written = [None] * len(worker.out_edges)
@@ -444,7 +444,7 @@ def _add_parameters(worker: Worker, written: list[Any] | None, parameters: dict[
     return written
 
 
-def writer(worker: Worker, position: int) -> Callable[[Any, int | None, float | None], None]:
+def writer(worker: RunningNode, position: int) -> Callable[[Any, int | None, float | None], None]:
     """What the `send` of an output does: `write`, with the plain case at hand."""
 
     def emit(value: Any, activity: int | None, stamp: float | None) -> None:
@@ -456,13 +456,13 @@ def writer(worker: Worker, position: int) -> Callable[[Any, int | None, float | 
     return emit
 
 
-def write(worker: Worker, position: int, value: object, activity: int | None, stamp: float | None) -> None:
+def write(worker: RunningNode, position: int, value: object, activity: int | None, stamp: float | None) -> None:
     """A node's code writes to an output: it leaves when the firing is over (F3).
 
     Raises:
       UsageError: outside a firing (also in a slot handler, F9), or twice in one firing.
     """
-    if worker.busy not in ("firing", "ending") and (worker.region is None or not worker.region.speaks(worker)):
+    if worker.busy not in ("firing", "ending") and (worker.region is None or not worker.region.is_sending(worker)):
         called = worker.busy == "call" or (not worker.busy and worker.stamp is not None)  # the fast path of calls
         where = "in a slot handler" if called else "outside a firing"
         raise UsageError(
@@ -475,7 +475,7 @@ def write(worker: Worker, position: int, value: object, activity: int | None, st
 
 
 def entry_of(
-    worker: Worker, position: int, written: list[Any] | None, value: Any, activity: int | None, stamp: float | None
+    worker: RunningNode, position: int, written: list[Any] | None, value: Any, activity: int | None, stamp: float | None
 ) -> tuple[Any, int | None, float | None] | None:
     """What a node's code writes to an output of which nothing was written before; None is silence (T2).
 
@@ -492,13 +492,13 @@ def entry_of(
     return unwrapped(value, activity, stamp)
 
 
-def finish_firing(worker: Worker, outcome: FiringOutcome) -> None:
+def finish_firing(worker: RunningNode, outcome: FiringOutcome) -> None:
     """The automatic events follow (A9), then the firing is over and releases what it took (F5)."""
     core = worker.core
     if worker.execution.limit_timer is not None:
         worker.execution.end_limit()
     if worker.events_due is not None:
-        flush_automatic(worker)
+        send_automatic(worker)
     if core.trace is not None:
         if outcome == "done" and worker.blocked & DISABLED:
             outcome = "abandoned"  # disabled meanwhile, with a subgraph around it: its outputs went nowhere (F10)

@@ -10,22 +10,22 @@ from collections.abc import Sequence
 from typing import Any
 
 from hfg.base.token import NO_MESSAGE, Marker
-from hfg.engine.model import Core, Iteration, Worker
-from hfg.engine.rules import firing, quiet, rings
+from hfg.engine.model import Core, Iteration, RunningNode
+from hfg.engine.rules import firing, quiescence, rings
 from hfg.engine.rules.releasing import take_from_reader
 from hfg.engine.rules.sending import put_outputs
 
 __all__ = ["begin", "settle", "step"]
 
 
-def begin(worker: Worker, arguments: Sequence[Any]) -> None:
+def begin(worker: RunningNode, arguments: Sequence[Any]) -> None:
     """The subgraph fires: its first element goes in. Collections of unequal length are an error of the firing (X1)."""
     iteration = worker.iteration
     assert iteration is not None
     try:
         iteration.begin(dict(zip(worker.type.inputs, arguments, strict=True)), worker.options.iterate_over)
     except Exception as error:  # what is no collection raises what it likes
-        worker.core.upstairs.fail(worker, f"firing {worker.counts.firings}", error, answer=True)
+        worker.core.rules.fail(worker, f"firing {worker.counts.firings}", error, answer=True)
         return
     worker.core.iterating.append(iteration)
     _go_on(iteration)
@@ -42,7 +42,7 @@ def settle(core: Core) -> bool:
     return went_on
 
 
-def step(worker: Worker) -> None:
+def step(worker: RunningNode) -> None:
     """The next piece of work of a worker inside; if nothing moves there any more, the next element follows at once."""
     if worker.is_boundary_output:
         _collect(worker)
@@ -75,7 +75,7 @@ def _go_on(iteration: Iteration) -> None:
     """
     worker = iteration.worker
     if iteration.next_element():
-        occupied = [edge for feed in iteration.feeds for edge in feed.all_out_edges() if edge.held]
+        occupied = [edge for feed in iteration.feeds for edge in feed.all_out_edges() if edge.unprocessed]
         if occupied:
             _fail(iteration, occupied)
             return
@@ -93,18 +93,18 @@ def _fail(iteration: Iteration, occupied: Sequence[Any]) -> None:
     """The present element cannot go in."""
     worker = iteration.worker
     labels = ", ".join(f'"{edge.label}"' for edge in occupied[:3])
-    target: Worker = occupied[0].target
+    target: RunningNode = occupied[0].target
     who = "" if target.is_boundary_output else f'"{target.path}" '
     problem = ValueError(
         f"element {iteration.position} of {iteration.count} cannot go in, for the one before lies untaken on {labels} "
-        f"and nothing moves inside any more: {who}{quiet.waits_for(target)}; let each element be taken"
+        f"and nothing moves inside any more: {who}{quiescence.waits_for(target)}; let each element be taken"
     )
     worker.core.iterating.remove(iteration)
     iteration.end()
-    worker.core.upstairs.fail(worker, f"firing {worker.counts.firings}", problem, answer=True)
+    worker.core.rules.fail(worker, f"firing {worker.counts.firings}", problem, answer=True)
 
 
-def _collect(reader: Worker) -> None:
+def _collect(reader: RunningNode) -> None:
     """What lies at an output of the inside comes out."""
     reader.dequeued()
     iteration = reader.within

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.ports.edges import Edge, SyncEdge
 
 __all__ = ["Listeners", "find_listeners", "listens", "may_listen"]
@@ -18,7 +18,7 @@ __all__ = ["Listeners", "find_listeners", "listens", "may_listen"]
 _FEW = 4  # so many edges are faster gone through
 
 
-def listens(worker: Worker) -> bool:
+def listens(worker: RunningNode) -> bool:
     """Whether a node is active, or a token with +1 waits for one of its slot calls."""
     if worker.active:
         return True
@@ -26,13 +26,13 @@ def listens(worker: Worker) -> bool:
     return bool(calls) and any(token.activity > 0 for edge in set(calls or ()) for token in edge.contents())
 
 
-def may_listen(worker: Worker) -> None:
+def may_listen(worker: RunningNode) -> None:
     """It has become active, or is about to: those who send to its slots are to look at it."""
     for listeners, edge in worker.listened or ():
         listeners.awake[edge] = None
 
 
-def find_listeners(worker: Worker) -> None:
+def find_listeners(worker: RunningNode) -> None:
     """Derive anew which edges of each output lead to slots that listen only while their nodes are active."""
     for old in worker.listeners:
         if old is not None:
@@ -41,7 +41,7 @@ def find_listeners(worker: Worker) -> None:
     worker.listeners = found if any(one is not None for one in found) else ()
 
 
-def _listeners(worker: Worker, edges: tuple[Any, ...]) -> Listeners | None:
+def _listeners(worker: RunningNode, edges: tuple[Any, ...]) -> Listeners | None:
     quiet = [edge for edge in edges if edge.while_active and type(edge) is SyncEdge and not edge.active]
     fast = worker.core.fast and worker.within is None
     if len(quiet) < _FEW or not fast or any(edge.tap is not None for edge in quiet):
@@ -58,7 +58,7 @@ class Listeners:
 
     __slots__ = ("_core", "_count", "_edges", "_others", "_quiet", "_seen", "awake")
 
-    def __init__(self, worker: Worker, edges: tuple[Any, ...], quiet: list[Any]) -> None:
+    def __init__(self, worker: RunningNode, edges: tuple[Any, ...], quiet: list[Any]) -> None:
         self._core = worker.core
         self._edges = edges
         self._quiet = quiet
@@ -68,7 +68,7 @@ class Listeners:
         self.awake: dict[Any, None] = dict.fromkeys(quiet)
         worker.core.listeners[self] = None
         for edge in quiet:
-            target: Worker = edge.target
+            target: RunningNode = edge.target
             if target.listened is None:
                 target.listened = []
             target.listened.append((self, edge))
@@ -106,7 +106,7 @@ class Listeners:
         self.settle_counts()
         del self._core.listeners[self]
         for edge in self._quiet:
-            target: Worker = edge.target
+            target: RunningNode = edge.target
             if target.listened is not None:
                 target.listened = [one for one in target.listened if one[0] is not self] or None
 

@@ -1,6 +1,6 @@
 """What activity does to a node, and what is lost or given back (rules A5-A8, F10).
 
-Stands on `agenda`; what follows from a change is decided upstairs.
+Stands on `agenda`; what follows from a change is decided further up.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 from hfg.activity.rules import after_receipt
 from hfg.base.token import Token
 from hfg.engine.model import Core, Scope
-from hfg.engine.model.worker import REMOVED, Worker
+from hfg.engine.model.running_node import REMOVED, RunningNode
 from hfg.engine.rules.agenda import freed
 from hfg.engine.rules.listening import may_listen
 from hfg.ports.edges import AnyEdge, Edge, EventEdge
@@ -33,14 +33,14 @@ __all__ = [
 ]
 
 
-def receive(worker: Worker, modifiers: Sequence[int]) -> None:
+def receive(worker: RunningNode, modifiers: Sequence[int]) -> None:
     """A6: only the net change counts."""
     active = after_receipt(worker.active, modifiers)
     if active != worker.active:
         set_active(worker, active, "token")
 
 
-def set_active(worker: Worker, active: bool, cause: ActivityCause) -> None:
+def set_active(worker: RunningNode, active: bool, cause: ActivityCause) -> None:
     """A(v) := active, and everything that follows a change."""
     if worker.active == active:
         return
@@ -51,14 +51,14 @@ def set_active(worker: Worker, active: bool, cause: ActivityCause) -> None:
     tell_activity(worker, cause)
     if not worker.watched:
         return
-    core.upstairs.activity_changed(worker, active)
+    core.rules.activity_changed(worker, active)
 
 
-def tell_activity(worker: Worker, cause: ActivityCause) -> None:
+def tell_activity(worker: RunningNode, cause: ActivityCause) -> None:
     """It has become active, or is no longer: tell who listens, if somebody does (R7)."""
     core = worker.core
-    if core.seldom is not None:
-        core.seldom(ActivityChanged(core.now(), worker.path, worker.active, cause))
+    if core.trace_changes is not None:
+        core.trace_changes(ActivityChanged(core.now(), worker.path, worker.active, cause))
 
 
 def touch(core: Core, scopes: Sequence[Scope]) -> None:
@@ -73,11 +73,11 @@ def derive_scopes(core: Core) -> None:
 
     Amid a change of several edges that is left to its end.
     """
-    if core.dirty_scopes and core.late is None:
-        core.upstairs.scopes_changed(core)
+    if core.dirty_scopes and core.deferred_events is None:
+        core.rules.scopes_changed(core)
 
 
-def automatic(worker: Worker, name: str, value: object = None) -> None:
+def automatic(worker: RunningNode, name: str, value: object = None) -> None:
     """An automatic event has arisen; it leaves after the firing or call under way, or at the next flush."""
     if name in worker.events:
         worker.expect_event(name, value)
@@ -86,7 +86,7 @@ def automatic(worker: Worker, name: str, value: object = None) -> None:
 def discard(edge: AnyEdge, reason: DropReason) -> None:
     """Take everything from an edge, counted and with its activity given back (F10, A8)."""
     tokens = edge.clear()
-    target: Worker = edge.target
+    target: RunningNode = edge.target
     if not tokens:
         return
     for token in tokens:
@@ -96,7 +96,7 @@ def discard(edge: AnyEdge, reason: DropReason) -> None:
             target.forget_call(edge)
     elif edge in target.live_inputs:
         target.inputs.expect()
-        target.unplace()
+        target.drop_firing()
     if type(edge) is EventEdge:
         freed(edge)
 
@@ -119,7 +119,7 @@ def count_dropped(edge: Edge, token: Token[Any], reason: DropReason) -> None:
 
 def give_back(edge: Edge) -> None:
     """A8: activity is never lost unseen: the sender has it again, or its loss is counted."""
-    sender: Worker = edge.source
+    sender: RunningNode = edge.source
     if sender in edge.target.core.inlets:
         return  # the sender is in another part, where the token lies as well and goes back from (L1)
     if sender.node is None or sender.scope is not None or sender.blocked & REMOVED:
@@ -132,12 +132,12 @@ def lose(edge: Edge) -> None:
     """Nobody can have the activity that came over the edge."""
     core: Core = edge.target.core
     core.lost_activity += 1
-    if core.seldom is not None:
-        core.seldom(ActivityLost(core.now(), edge.label))
+    if core.trace_changes is not None:
+        core.trace_changes(ActivityLost(core.now(), edge.label))
 
 
-def report_error(worker: Worker, what: str, error: str, policy: str) -> None:
+def report_error(worker: RunningNode, what: str, error: str, policy: str) -> None:
     """Tell whoever listens that a node's code failed."""
     core = worker.core
-    if core.seldom is not None:
-        core.seldom(ErrorRaised(core.now(), worker.path, what, error, policy))
+    if core.trace_changes is not None:
+        core.trace_changes(ErrorRaised(core.now(), worker.path, what, error, policy))

@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 from hfg.base.token import Token
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.engine.rules.agenda import consider, freed
 from hfg.engine.rules.sending import send_end
 from hfg.ports.edges import AnyEdge, EventEdge
@@ -32,7 +32,7 @@ def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
         edge = stack.pop()
         if not edge.release():
             continue
-        producer: Worker = edge.waits
+        producer: RunningNode = edge.waits
         core = producer.core
         if core.trace is not None and edge not in drained:
             core.trace(TokenProcessed(core.now(), edge.label))
@@ -50,13 +50,13 @@ def make_room(edge: AnyEdge) -> None:
         release((edge,))
 
 
-def outputs_free(worker: Worker) -> Sequence[Any]:
+def outputs_free(worker: RunningNode) -> Sequence[Any]:
     """All its tokens are processed: it may go on; gives back the edges that are released by that (F5 sequential)."""
     released = worker.outputs_free()
     if worker.outputs.waiters is not None:
         worker.outputs.notify()
-    if worker.flights is not None:
-        worker.core.upstairs.land(worker)
+    if worker.concurrent is not None:
+        worker.core.rules.complete_firings(worker)
     elif worker.ending is not None and worker.ending.pending and worker.busy in ("", "edit"):
         send_end(worker)
     else:
@@ -64,13 +64,13 @@ def outputs_free(worker: Worker) -> Sequence[Any]:
     return released
 
 
-def take_from_reader(worker: Worker) -> Token[Any]:
+def take_from_reader(worker: RunningNode) -> Token[Any]:
     """Take the token that lies before a reader; its place is free at once."""
     edge = worker.live_inputs[0]
     token: Token[Any] = edge.take()
     if not edge.untaken:
         worker.inputs.expect()
-    worker.lose_place()
+    worker.make_unfireable()
     core = worker.core
     if core.trace is not None:
         core.trace(TokenTaken(core.now(), edge.label, token))

@@ -11,8 +11,8 @@ import random
 from collections.abc import Callable
 from typing import Any
 
-from hfg.engine.model.flights import Attempts
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.concurrent import Attempts
+from hfg.engine.model.running_node import RunningNode
 from hfg.engine.rules import firing
 from hfg.errors import in_words
 from hfg.trace import FiringRetried
@@ -22,7 +22,7 @@ __all__ = ["retry", "try_again"]
 _LOGGER = logging.getLogger("hfg.engine")
 
 
-def retry(worker: Worker, error: BaseException) -> bool:
+def retry(worker: RunningNode, error: BaseException) -> bool:
     """The firing of a worker, which has one at a time, has failed: whether it is tried again."""
     attempts = worker.attempts
     if attempts is None:
@@ -40,7 +40,9 @@ def retry(worker: Worker, error: BaseException) -> bool:
     return True
 
 
-def try_again(worker: Worker, attempts: Attempts, number: int, error: BaseException, again: Callable[[], None]) -> bool:
+def try_again(
+    worker: RunningNode, attempts: Attempts, number: int, error: BaseException, again: Callable[[], None]
+) -> bool:
     """If a firing that has failed may be tried once more, let that be after a pause.
 
     Args:
@@ -83,7 +85,7 @@ def _name(kind: type) -> str:
     return kind.__qualname__ if kind.__module__ == "builtins" else f"{kind.__module__}:{kind.__qualname__}"
 
 
-def _pause(worker: Worker, number: int, made: int) -> float:
+def _pause(worker: RunningNode, number: int, made: int) -> float:
     """Seconds until the next attempt: the more there were the longer, and drawn by the run's seed if by chance at all.
 
     Each draw is by itself, so that it does not depend on the order in which firings fail.

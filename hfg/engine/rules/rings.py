@@ -19,7 +19,16 @@ from collections.abc import Iterable, Iterator
 from typing import Any, Final, TypeAlias
 
 from hfg.engine.model import Core
-from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, CROWDED, ENDED, FIRES_NO_MORE, FULL, RATE, Worker
+from hfg.engine.model.running_node import (
+    AT_CONCURRENCY,
+    BACKOFF,
+    BETWEEN_FIRINGS,
+    ENDED,
+    FIRES_NO_MORE,
+    FULL,
+    RATE,
+    RunningNode,
+)
 from hfg.engine.rules.agenda import freed, must_wait
 from hfg.errors import QueueLimit, RunError
 from hfg.graph.flat.order import strongly_connected
@@ -30,7 +39,7 @@ _LOGGER = logging.getLogger("hfg.engine")
 
 __all__ = ["grow_queue", "is_held", "look_at_all", "resolve", "smallest_at_rest"]
 
-Action: TypeAlias = "tuple[Worker | None, str]"
+Action: TypeAlias = "tuple[RunningNode | None, str]"
 """What somebody waits for: that a worker does something. None stands for the other parts of a graph that is cut."""
 
 _FIRE: Final = "fire"  # begins its next firing
@@ -65,9 +74,9 @@ _NEVER = _Wait([], any_of=True)
 def resolve(core: Core) -> bool:
     """Let each ring that has closed grow, as long as there are any; whether there were."""
     grew = False
-    again: list[Worker] = []  # nobody tells when what keeps these out of rings changes
+    again: list[RunningNode] = []  # nobody tells when what keeps these out of rings changes
     while not core.over and (suspects := _take_suspects(core)):
-        known: dict[Worker, bool] = {}
+        known: dict[RunningNode, bool] = {}
         again += [worker for worker in suspects if _plainly_goes_on(worker, known)]
         suspects = [worker for worker in suspects if not known[worker]]
         walk = _Walk(core)
@@ -83,10 +92,10 @@ def resolve(core: Core) -> bool:
     return grew
 
 
-def _take_suspects(core: Core) -> list[Worker]:
+def _take_suspects(core: Core) -> list[RunningNode]:
     """Give all that may have come to be in a ring; each is looked at once."""
     if not core.full_edges:
-        suspects: Iterable[Worker] = ()
+        suspects: Iterable[RunningNode] = ()
     else:
         suspects = core.workers if core.all_suspect else list(core.suspects)
     core.all_suspect = False
@@ -116,7 +125,7 @@ def smallest_at_rest(core: Core) -> EventEdge | None:
 def grow_queue(core: Core, edge: EventEdge) -> None:
     """F8: this queue gets one more place, or the run fails, for it may not grow."""
     if edge.capacity_limit is not None and edge.capacity >= edge.capacity_limit:
-        core.host.finish(
+        core.runtime.finish(
             "failed",
             QueueLimit(
                 f'queue of "{edge.label}" holds {len(edge.queue)} signals, the nodes around it wait for each other, '
@@ -129,10 +138,10 @@ def grow_queue(core: Core, edge: EventEdge) -> None:
     declared = edge.capacity - edge.grown
     if edge.capacity == max(_OVERGROWN * declared, _SMALL) + 1:
         _report_overgrown(core, edge, declared)
-    if core.seldom is not None:
-        core.seldom(QueueGrown(core.now(), edge.label, edge.capacity))
+    if core.trace_changes is not None:
+        core.trace_changes(QueueGrown(core.now(), edge.label, edge.capacity))
     freed(edge)
-    core.host.kick()
+    core.runtime.kick()
 
 
 _OVERGROWN: Final = 8
@@ -159,13 +168,13 @@ def _report_overgrown(core: Core, edge: EventEdge, declared: int) -> None:
     core.errors.append(RunError(what))
 
 
-def _ring_of(core: Core, edge: EventEdge) -> list[Worker]:
+def _ring_of(core: Core, edge: EventEdge) -> list[RunningNode]:
     """Return the shortest way from the target of an edge back to it, with the source of the edge at both ends."""
-    leads_to: dict[Worker, list[Worker]] = {}
+    leads_to: dict[RunningNode, list[RunningNode]] = {}
     for one in core.edges:
         if one.source is not None and one.target is not None:
             leads_to.setdefault(one.source, []).append(one.target)
-    came_from: dict[Worker, Worker] = {edge.target: edge.source}
+    came_from: dict[RunningNode, RunningNode] = {edge.target: edge.source}
     ahead = deque([edge.target])
     while ahead and edge.source not in came_from:
         worker = ahead.popleft()
@@ -188,12 +197,12 @@ class _Walk:
         self._core = core
         self._at_rest = at_rest
         self._waits: dict[Action, _Wait] = {}
-        self._may: dict[Action, Worker | None] = {}  # what may happen by itself: whose code or timer that is
+        self._may: dict[Action, RunningNode | None] = {}  # what may happen by itself: whose code or timer that is
         self._opened: dict[Action, Action | None] = {}  # what may happen, and by which other action that was found
 
     # --- rings ------------------------------------------------------------------------------------------------------
 
-    def smallest_of_rings(self, held: Iterable[Worker]) -> list[EventEdge]:
+    def smallest_of_rings(self, held: Iterable[RunningNode]) -> list[EventEdge]:
         """Give of each ring its full queue with the smallest capacity; a ring that waits for another comes later."""
         self._follow([(worker, _ROOM) for worker in held])
         self._open()
@@ -257,7 +266,7 @@ class _Walk:
                     self._opened[other] = action
                     waiting.append(other)
 
-    def watch(self, held: Iterable[Worker]) -> list[Worker]:
+    def watch(self, held: Iterable[RunningNode]) -> list[RunningNode]:
         """Have these looked at again when what keeps them out of rings has changed; give those whom nobody tells."""
         again = []
         for worker in held:
@@ -267,7 +276,7 @@ class _Walk:
                 worker.room.tell_watchers()
         return again
 
-    def _reasons(self, held: Worker) -> Iterator[Action]:
+    def _reasons(self, held: RunningNode) -> Iterator[Action]:
         """Give what may happen by itself, and who else is held back and has reasons of its own."""
         begin: Action = (held, _ROOM)
         if begin not in self._opened:
@@ -285,7 +294,7 @@ class _Walk:
                     seen.add(other)
                     waiting.append(other)
 
-    def _will_tell(self, reason: Action, held: Worker) -> bool:
+    def _will_tell(self, reason: Action, held: RunningNode) -> bool:
         """Whether the held one is looked at again when that has changed."""
         leaf = reason[0] if reason in self._waits else self._may[reason]
         if leaf is None or (leaf is held and reason in self._waits):
@@ -300,7 +309,7 @@ class _Walk:
 
     # --- what each action waits for ---------------------------------------------------------------------------------
 
-    def _look(self, action: Action) -> _Wait | Worker | None:
+    def _look(self, action: Action) -> _Wait | RunningNode | None:
         """Say what an action waits for, or whose doing it is that it may happen by itself; None: nobody tells of it."""
         worker, what = action
         if worker is None:
@@ -320,7 +329,7 @@ class _Walk:
             return _tell(worker)
         return _finish(worker) if what == _FINISH else _hear(worker)
 
-    def _at_border(self, worker: Worker) -> _Wait | Worker:
+    def _at_border(self, worker: RunningNode) -> _Wait | RunningNode:
         """What stands for the graph's own ports, for other parts of it, or for the border of what iterates."""
         core = self._core
         if worker in core.outlets or worker in core.inlets:
@@ -340,7 +349,7 @@ class _Walk:
 # --- what each action waits for ---------------------------------------------------------------------------------------
 
 
-def _fire(worker: Worker) -> _Wait | Worker:
+def _fire(worker: RunningNode) -> _Wait | RunningNode:
     """F1: all that its next firing waits for."""
     blocked = worker.blocked
     if _works_on_firing(worker) or blocked & BACKOFF:
@@ -354,16 +363,16 @@ def _fire(worker: Worker) -> _Wait | Worker:
     return _Wait(on) if on else worker
 
 
-def _counts(worker: Worker, waits_for: list[Action]) -> bool:
+def _counts(worker: RunningNode, waits_for: list[Action]) -> bool:
     """Whether F8 holds its next firing by itself: not beside a rate, a gate or `ready()`, and not beside a call."""
     if worker.room.waiting:
         return True
-    if worker.blocked & ~(FULL | CROWDED) or worker.busy not in AMID_NOTHING:
+    if worker.blocked & ~(FULL | AT_CONCURRENCY) or worker.busy not in BETWEEN_FIRINGS:
         return False
     return bool(waits_for) or not (worker.paced and must_wait(worker))
 
 
-def _call(worker: Worker) -> _Wait | Worker:
+def _call(worker: RunningNode) -> _Wait | RunningNode:
     """F9: all that its next slot call waits for."""
     if worker.blocked >= BACKOFF or _works(worker):
         return worker
@@ -373,12 +382,12 @@ def _call(worker: Worker) -> _Wait | Worker:
     return _Wait(on) if on else worker
 
 
-def _hear(worker: Worker) -> _Wait:
+def _hear(worker: RunningNode) -> _Wait:
     """A token at one of its slots: any will do."""
     return _Wait([_sending(edge) for edge in worker.called_by() if edge.live], any_of=True)
 
 
-def _tell(worker: Worker) -> _Wait | None:
+def _tell(worker: RunningNode) -> _Wait | None:
     """A signal of its own: by whatever code of it runs next."""
     if worker.tasks is not None and worker.tasks.move:
         return None
@@ -392,7 +401,7 @@ def _tell(worker: Worker) -> _Wait | None:
     return _Wait(on, any_of=True)
 
 
-def _finish(worker: Worker) -> _Wait | Worker:
+def _finish(worker: RunningNode) -> _Wait | RunningNode:
     """F5, F6: that all is processed of the firing or call that has taken a token."""
     if _works(worker):
         return worker
@@ -402,15 +411,15 @@ def _finish(worker: Worker) -> _Wait | Worker:
     return _Wait(on) if on else worker
 
 
-def _processing(worker: Worker) -> list[Action]:
+def _processing(worker: RunningNode) -> list[Action]:
     """F5: what its outputs wait for."""
-    edges = [edge for edges in worker.out_edges for edge in edges if edge.held]
+    edges = [edge for edges in worker.out_edges for edge in edges if edge.unprocessed]
     return [_taking(edge) if edge.untaken else (edge.target, _FINISH) for edge in edges]
 
 
 def _sending(edge: AnyEdge) -> Action:
     """Who would put a token on this edge."""
-    source: Worker = edge.source
+    source: RunningNode = edge.source
     if type(edge) is not EventEdge:
         return source, _FIRE
     timeout = source.events.get("timeout") if source.active_timer is not None else None
@@ -420,7 +429,7 @@ def _sending(edge: AnyEdge) -> Action:
 
 def _taking(edge: AnyEdge) -> Action:
     """Who would take the oldest token from this edge."""
-    target: Worker = edge.target
+    target: RunningNode = edge.target
     called = edge.target_kind == "slot" or (edge.target_kind == "parameter" and type(edge) is EventEdge)
     return target, _CALL if called else _FIRE
 
@@ -432,31 +441,31 @@ def _size(edge: EventEdge) -> tuple[int, float]:
     return edge.capacity, edge.index
 
 
-def _full_edges(worker: Worker) -> list[EventEdge]:
+def _full_edges(worker: RunningNode) -> list[EventEdge]:
     return [edge for edge in worker.event_edges() if edge.full]
 
 
-def _works(worker: Worker) -> bool:
+def _works(worker: RunningNode) -> bool:
     """Whether a firing or call is under way that does not only wait for room."""
-    if worker.flights is None:
-        return worker.busy not in AMID_NOTHING and not worker.room.waiting  # an edit that holds it changes no wait
-    unfinished = sum(not flight.outcome for flight in worker.flights)
-    return unfinished + (worker.busy not in AMID_NOTHING) > worker.room.waiting
+    if worker.concurrent is None:
+        return worker.busy not in BETWEEN_FIRINGS and not worker.room.waiting  # an edit that holds it changes no wait
+    unfinished = sum(not started.outcome for started in worker.concurrent)
+    return unfinished + (worker.busy not in BETWEEN_FIRINGS) > worker.room.waiting
 
 
-def _works_on_firing(worker: Worker) -> bool:
+def _works_on_firing(worker: RunningNode) -> bool:
     """The same, but for a slot call that excludes firings (F9)."""
-    return _works(worker) and (worker.flights is not None or worker.busy != "call")
+    return _works(worker) and (worker.concurrent is not None or worker.busy != "call")
 
 
-def is_held(worker: Worker) -> bool:
+def is_held(worker: RunningNode) -> bool:
     """Whether a full queue alone holds it back: code that waits for room, a slot call, or its next firing.
 
     A rate that holds it too is to be over first.
     """
     if worker.codes_waiting_for_room():
         return True
-    if not worker.blocked & FULL or worker.busy not in AMID_NOTHING:
+    if not worker.blocked & FULL or worker.busy not in BETWEEN_FIRINGS:
         return False
     if worker.calls and worker.blocked < BACKOFF:
         return True
@@ -465,19 +474,19 @@ def is_held(worker: Worker) -> bool:
     return not _processing(worker) and not (worker.paced and must_wait(worker))
 
 
-def _goes_on(worker: Worker, what: str) -> bool:
+def _goes_on(worker: RunningNode, what: str) -> bool:
     """Whether code of it is under way, or the timer of a rate that alone delays this, which say so when over."""
     if worker.execution.in_flight or (what == _FIRE and worker.blocked & RATE):
         return True
-    return worker.flights is not None and worker.flights.working > 0
+    return worker.concurrent is not None and worker.concurrent.working > 0
 
 
 # --- a short way: chains of full queues that end where something goes on ----------------------------------------------
 
 
-def _plainly_goes_on(held: Worker, known: dict[Worker, bool]) -> bool:
+def _plainly_goes_on(held: RunningNode, known: dict[RunningNode, bool]) -> bool:
     """Whether from full queue to full queue we come to a node that takes next, or is busy; `known`: what was found."""
-    chain: dict[Worker, None] = {}
+    chain: dict[RunningNode, None] = {}
     worker = held
     while worker not in known:
         chain[worker] = None
@@ -495,14 +504,14 @@ def _plainly_goes_on(held: Worker, known: dict[Worker, bool]) -> bool:
     return known[held]
 
 
-def _takes_next(worker: Worker, what: str) -> bool:
+def _takes_next(worker: RunningNode, what: str) -> bool:
     if worker.queued and not worker.group.threaded:
         return True
     return _works(worker) if what == _CALL else _works_on_firing(worker)
 
 
-def _has_only_to_have_room(worker: Worker, what: str) -> bool:
-    if worker.busy not in AMID_NOTHING or not worker.room.full_edges or worker.paced:
+def _has_only_to_have_room(worker: RunningNode, what: str) -> bool:
+    if worker.busy not in BETWEEN_FIRINGS or not worker.room.full_edges or worker.paced:
         return False
     if what == _CALL:
         return worker.blocked < BACKOFF

@@ -12,8 +12,8 @@ from typing import Any, TypeAlias
 from hfg.activity.rules import asked_for, leaving
 from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.engine.model import Core, RunningEvent
-from hfg.engine.model.worker import AMID_NOTHING, DISABLED, ENDED, RATE, Worker
-from hfg.engine.rules.agenda import add_call, arrived, let_follow, note_full
+from hfg.engine.model.running_node import BETWEEN_FIRINGS, DISABLED, ENDED, RATE, RunningNode
+from hfg.engine.rules.agenda import add_call, arrived, note_full, queue_next_in_wave
 from hfg.engine.rules.listening import listens, may_listen
 from hfg.engine.rules.modifiers import (
     automatic,
@@ -32,17 +32,17 @@ from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenProcessed, T
 __all__ = [
     "announce",
     "bring_activity",
+    "deferring_events",
+    "emit_automatic",
     "enqueue",
-    "flush_automatic",
     "put",
     "put_arrived",
     "put_outputs",
     "put_value",
+    "send_automatic",
     "send_end",
-    "tell",
-    "telling_behind",
     "trigger",
-    "trigger_beside",
+    "trigger_from_task",
     "unwrapped",
 ]
 
@@ -63,7 +63,7 @@ def unwrapped(value: object, explicit: int | None = None, stamp: float | None = 
     return (value.value, asked_for(explicit, value.activity), value.stamp if stamp is None else stamp)
 
 
-def put_outputs(worker: Worker, written: Written) -> None:
+def put_outputs(worker: RunningNode, written: Written) -> None:
     """Put exactly one token on every live edge of every output, all together (F3), and let activity leave (A3, A5).
 
     Args:
@@ -71,65 +71,65 @@ def put_outputs(worker: Worker, written: Written) -> None:
       written: per output (value, explicit modifier, explicit stamp).
     """
     core = worker.core
-    since = len(core.followers)
+    since = len(core.next_in_wave)
     _put_outputs(worker, written)
-    let_follow(core, since)
+    queue_next_in_wave(core, since)
     _sent(core)
 
 
-def put_value(worker: Worker, value: object) -> None:
+def put_value(worker: RunningNode, value: object) -> None:
     """The same for a value without modifier and stamp of its own on the one output of a worker (`Shape.single`)."""
     shape, core = worker.shape, worker.core
     if value is None:
         value = NO_MESSAGE
-    if worker.listeners or (shape.gives and (worker.active or worker.right)):
+    if worker.listeners or (shape.gives and (worker.active or worker.may_carry)):
         put_outputs(worker, [(value, None, None)])
         return
-    since = len(core.followers)
+    since = len(core.next_in_wave)
     stamp = worker.stamp
     if stamp is None:
         stamp = core.now()
     for edge in shape.outgoing:
         put(edge, value, 0, stamp)
-    if worker.outputs.missing and (worker.placed or worker.blocked & RATE):
-        worker.unplace()
-    if len(core.followers) > since:
-        let_follow(core, since)
+    if worker.outputs.missing and (worker.fireable or worker.blocked & RATE):
+        worker.drop_firing()
+    if len(core.next_in_wave) > since:
+        queue_next_in_wave(core, since)
     if core.returned or core.drained or core.dirty_scopes:
         _sent(core)
 
 
-def put_arrived(worker: Worker, value: object, modifier: int, stamp: float) -> None:
+def put_arrived(worker: RunningNode, value: object, modifier: int, stamp: float) -> None:
     """The same for a token that has come from another part of the graph: `worker` stands for that, and has one edge."""
     if worker.listeners:
         put_outputs(worker, [(value, modifier, stamp)])
         return
     core = worker.core
-    since = len(core.followers)
+    since = len(core.next_in_wave)
     edge = worker.out_edges[0][0]
     put(edge, value, leaving(False, edge.active, modifier, value is NO_MESSAGE), stamp)
-    if worker.outputs.missing and worker.placed:
-        worker.unplace()
-    if len(core.followers) > since:
-        let_follow(core, since)
+    if worker.outputs.missing and worker.fireable:
+        worker.drop_firing()
+    if len(core.next_in_wave) > since:
+        queue_next_in_wave(core, since)
     if core.returned or core.drained or core.dirty_scopes:
         _sent(core)
 
 
-def _put_outputs(worker: Worker, written: Written) -> None:
+def _put_outputs(worker: RunningNode, written: Written) -> None:
     carried = False
     for edge, value, modifier, stamp in _tokens(worker, written):
         carried = carried or modifier == 1
         put(edge, value, modifier, stamp)
-    if worker.outputs.missing and (worker.placed or worker.blocked & RATE):
-        worker.unplace()
+    if worker.outputs.missing and (worker.fireable or worker.blocked & RATE):
+        worker.drop_firing()
     if carried:
         _activity_left(worker)
 
 
-def _tokens(worker: Worker, written: Written) -> list[tuple[SyncEdge | BufferEdge, Any, int, float]]:
+def _tokens(worker: RunningNode, written: Written) -> list[tuple[SyncEdge | BufferEdge, Any, int, float]]:
     """What is to be put on which edge, those into slots first (F9); by A3 and A4 each has its modifier."""
-    may_carry = worker.active or worker.right
+    may_carry = worker.active or worker.may_carry
     present = worker.stamp
     if present is None:
         present = worker.core.now()
@@ -147,7 +147,7 @@ def _tokens(worker: Worker, written: Written) -> list[tuple[SyncEdge | BufferEdg
     return for_slots + for_inputs
 
 
-def _activity_left(worker: Worker) -> None:
+def _activity_left(worker: RunningNode) -> None:
     """A5: the first sending that carried +1 took the activity.
 
     The right of A3 stays until the firing or call is over.
@@ -156,16 +156,16 @@ def _activity_left(worker: Worker) -> None:
         return  # what it gave was none of its own (A4), or left before (A3)
     if worker.scope is not None:  # by its events it leaves everything inside (G2)
         worker.become(False)
-        worker.core.upstairs.deactivate_inside(worker.scope, "sent")
+        worker.core.rules.deactivate_inside(worker.scope, "sent")
     else:
-        worker.keep_right(worker.stamp is not None)  # in a firing or call
+        worker.let_carry(worker.stamp is not None)  # in a firing or call
         set_active(worker, False, "sent")
 
 
 def put(edge: SyncEdge | BufferEdge, value: object, modifier: int, stamp: float) -> None:
     """Put one token on a synchronous edge."""
     token = Token(value, modifier, stamp, edge.number())
-    target: Worker = edge.target
+    target: RunningNode = edge.target
     core = target.core
     if core.trace is not None or edge.tap is not None:
         _show(edge, token)
@@ -204,7 +204,7 @@ def _is_unheard(edge: AnyEdge, value: object, modifier: int) -> bool:
     return type(value) is Marker or (edge.while_active and modifier <= 0 and not listens(edge.target))
 
 
-def bring_activity(target: Worker) -> None:
+def bring_activity(target: RunningNode) -> None:
     """A token with +1 lies before a node: it is about to listen (T4), and subgraphs around it are to look (G2)."""
     if target.listened is not None:
         may_listen(target)
@@ -214,7 +214,7 @@ def bring_activity(target: Worker) -> None:
 
 def _drain(edge: AnyEdge, lying: Lying) -> None:
     """T4, F12: the token is processed at once, without a firing or call; its modifier acts behind the sending."""
-    target: Worker = edge.target
+    target: RunningNode = edge.target
     core = target.core
     modifier = lying[ACTIVITY]
     into_slot = edge.target_kind == "slot"
@@ -245,11 +245,11 @@ def _sent(core: Core) -> None:
     if core.dirty_scopes:
         derive_scopes(core)
     for target, _ in drained:
-        if target.busy in AMID_NOTHING:  # else it follows the firing or call under way
-            tell(target)
+        if target.busy in BETWEEN_FIRINGS:  # else it follows the firing or call under way
+            emit_automatic(target)
 
 
-def announce(worker: Worker, written: Written, *, processed: bool = True) -> None:
+def announce(worker: RunningNode, written: Written, *, processed: bool = True) -> None:
     """A9: what has left by the outputs is told behind them where somebody asks; then that the firing is `processed`.
 
     The value goes with the stamp of its token. A modifier is for the outputs alone: these are sendings of their own.
@@ -266,26 +266,26 @@ def announce(worker: Worker, written: Written, *, processed: bool = True) -> Non
             automatic(worker, name, Token(value, 0, own_stamp if stamp is None else stamp))
 
 
-def send_end(worker: Worker) -> None:
+def send_end(worker: RunningNode) -> None:
     """END leaves on all outputs; from here the node, which is amid nothing, is over (F4, F12)."""
     core = worker.core
     end = (END, None, None)
-    with telling_behind(core):
+    with deferring_events(core):
         assert worker.ending is not None
         worker.send_as(worker.ending.send())
-        since = len(core.followers)
+        since = len(core.next_in_wave)
         _put_outputs(worker, [end] * len(worker.out_edges))
-        let_follow(core, since)
+        queue_next_in_wave(core, since)
         worker.leave()  # no firing or call goes on that could use it: the next slot call must not (A3)
         _sent(core)
-        if core.seldom is not None:
-            core.seldom(NodeEnded(core.now(), worker.path))
+        if core.trace_changes is not None:
+            core.trace_changes(NodeEnded(core.now(), worker.path))
         deferred = worker.ending.take_deferred()
         for modifier in deferred:
             receive(worker, (modifier,))
         if deferred and worker.scopes:
             touch(core, worker.scopes)
-    core.upstairs.node_ended(worker)
+    core.rules.node_ended(worker)
 
 
 def trigger(
@@ -308,7 +308,7 @@ def trigger(
     value, explicit, stamp = unwrapped(value, explicit, stamp)
     if stamp is None:
         stamp = core.now() if worker.stamp is None else worker.stamp
-    signals = _signals(event, explicit, may_carry=worker.active or (extend_right and worker.right))
+    signals = _signals(event, explicit, may_carry=worker.active or (extend_right and worker.may_carry))
     carried = any([modifier == 1 for _, modifier in signals])  # noqa: C419 - few, and a list is faster
     _show_signal(event, Token(value, 1 if carried else explicit or 0, stamp))
     for edge, modifier in signals:
@@ -320,12 +320,12 @@ def trigger(
         _activity_left(worker)
     _sent(core)
     if not core.pumping:
-        core.host.kick()
-    if core.heard:
-        _tell_subscribers(core)
+        core.runtime.kick()
+    if core.to_notify:
+        _notify_subscribers(core)
 
 
-def trigger_beside(
+def trigger_from_task(
     event: RunningEvent, value: object = None, explicit: int | None = None, stamp: float | None = None
 ) -> None:
     """A task of the node sends a signal: a sending of its own, with the present as its stamp (T5, A3, A9).
@@ -333,11 +333,11 @@ def trigger_beside(
     If it takes the activity of the node, a firing or call that is under way has no right to that by A3.
     """
     worker = event.worker
-    right = worker.right
+    right = worker.may_carry
     value, explicit, stamp = unwrapped(value, explicit, stamp)
     trigger(event, value, explicit, worker.core.now() if stamp is None else stamp, extend_right=False)
     if not right:
-        worker.keep_right(False)
+        worker.let_carry(False)
 
 
 def _signals(event: RunningEvent, explicit: int | None, *, may_carry: bool) -> list[tuple[EventEdge, int]]:
@@ -361,22 +361,22 @@ def _show_signal(event: RunningEvent, signal: Token[Any]) -> None:
     if core.trace is not None:
         core.trace(EventTriggered(core.now(), event.label, signal))
     if port is not None and port._observers:
-        core.heard.append((port, signal))
+        core.to_notify.append((port, signal))
     for look in event.tap or ():
         look(signal)
 
 
-def _tell_subscribers(core: Core) -> None:
+def _notify_subscribers(core: Core) -> None:
     """F3: they hear of signals that are on their edges, and in that order; what they trigger is heard of behind."""
-    if core.telling:
+    if core.notifying:
         return
-    core.telling = True
+    core.notifying = True
     try:
-        while core.heard:
-            port, token = core.heard.popleft()
+        while core.to_notify:
+            port, token = core.to_notify.popleft()
             port._notify(token)
     finally:
-        core.telling = False
+        core.notifying = False
 
 
 def _into_operators(edge: EventEdge, token: Token[Any]) -> None:
@@ -385,7 +385,7 @@ def _into_operators(edge: EventEdge, token: Token[Any]) -> None:
     try:
         edge.pipeline(token)
     except Exception as error:
-        edge.target.core.upstairs.operator_failed(edge, error)
+        edge.target.core.rules.operator_failed(edge, error)
 
 
 def enqueue(edge: EventEdge, value: object, modifier: int, stamp: float) -> None:
@@ -397,7 +397,7 @@ def enqueue(edge: EventEdge, value: object, modifier: int, stamp: float) -> None
 def _append(edge: EventEdge, value: object, modifier: int, stamp: float) -> None:
     """Put one token into the queue of an event edge, by its policy (P5, F8)."""
     lying = (value, modifier, stamp, edge.number())
-    target: Worker = edge.target
+    target: RunningNode = edge.target
     core = target.core
     if core.trace is not None or edge.tap is not None:
         _show(edge, Token(*lying))
@@ -425,7 +425,7 @@ def _append(edge: EventEdge, value: object, modifier: int, stamp: float) -> None
     if type(value) is Marker:
         target.mark_special()
     if not edge.live:  # its operators held it back until its sender was disabled (P9, F10)
-        core.upstairs.rewire(target)
+        core.rules.rewire(target)
     elif not holds_one:
         arrived(edge)
 
@@ -439,34 +439,34 @@ def _has_made_room(edge: EventEdge, lying: Lying) -> bool:
     return oldest
 
 
-def tell(worker: Worker) -> None:
+def emit_automatic(worker: RunningNode) -> None:
     """Send the automatic events of a node that is amid nothing: at once, or behind a change of several edges."""
-    late = worker.core.late
+    late = worker.core.deferred_events
     if late is None:
-        flush_automatic(worker)
+        send_automatic(worker)
     else:
         late.append(worker)
 
 
 @contextmanager
-def telling_behind(core: Core) -> Iterator[None]:
+def deferring_events(core: Core) -> Iterator[None]:
     """What arises by a change of several edges is told when all of it is done (F10, R4), by subgraphs last (G2)."""
-    if core.late is not None:
+    if core.deferred_events is not None:
         yield
         return
-    late: list[Worker] = []
-    core.late = late
+    late: list[RunningNode] = []
+    core.deferred_events = late
     try:
         yield
         for worker in late:  # which grows by what these come to
-            if worker.busy in AMID_NOTHING:
-                flush_automatic(worker)
+            if worker.busy in BETWEEN_FIRINGS:
+                send_automatic(worker)
     finally:
-        core.late = None
+        core.deferred_events = None
     derive_scopes(core)
 
 
-def flush_automatic(worker: Worker) -> None:
+def send_automatic(worker: RunningNode) -> None:
     """A9: the automatic events follow as sendings of their own, in the order they arose."""
     while worker.events_due:
         for name, value in worker.take_events():

@@ -9,14 +9,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from hfg.base.token import Token
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.errors import UsageError
 from hfg.ports.edges import Edge
 
 __all__ = ["need_unchanged", "need_unwritten", "taken"]
 
 
-def taken(worker: Worker, edges: Sequence[Edge], tokens: Sequence[Token[Any]]) -> None:
+def taken(worker: RunningNode, edges: Sequence[Edge], tokens: Sequence[Token[Any]]) -> None:
     """A firing or call has taken these tokens. One that was changed on its edge is a failure of who has sent it."""
     sharing = worker.core.sharing
     if sharing is None:
@@ -26,10 +26,10 @@ def taken(worker: Worker, edges: Sequence[Edge], tokens: Sequence[Token[Any]]) -
             f'a value that it sent on "{edge.label}" was changed before "{worker.path}" took it, but what is sent is '
             "shared and not changed (T1): send a copy, or make a new one each time"
         )
-        worker.core.upstairs.fail(edge.source, "what it has sent", problem, answer=False)
+        worker.core.rules.fail(edge.source, "what it has sent", problem, answer=False)
 
 
-def need_unchanged(worker: Worker) -> None:
+def need_unchanged(worker: RunningNode) -> None:
     """The code of a firing or call is over: it has left what it took as it was.
 
     Raises:
@@ -46,7 +46,7 @@ def need_unchanged(worker: Worker) -> None:
         )
 
 
-def need_unwritten(worker: Worker, port: str, value: Any) -> None:
+def need_unwritten(worker: RunningNode, port: str, value: Any) -> None:
     """A node is about to send a value: it is none that was sent before and written to since, while others hold it.
 
     Raises:

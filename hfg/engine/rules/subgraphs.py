@@ -9,17 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 
-from hfg.engine.model import Scope, Worker
-from hfg.engine.rules import lifecycle, wiring
+from hfg.engine.model import RunningNode, Scope
+from hfg.engine.rules import node_lifecycle, wiring
 from hfg.engine.rules.activity import deactivate_inside, scopes_changed
 from hfg.engine.rules.agenda import consider
-from hfg.engine.rules.lifecycle import when_idle
 from hfg.engine.rules.modifiers import derive_scopes
+from hfg.engine.rules.node_lifecycle import when_idle
 from hfg.trace import NodeEnabled
 
 __all__ = ["disable_scope", "enable_scope", "run_slot"]
 
-Action = Callable[[Worker, Callable[[], None]], None]
+Action = Callable[[RunningNode, Callable[[], None]], None]
 
 
 def run_slot(scope: Scope, name: str, then: Callable[[], None]) -> None:
@@ -35,10 +35,10 @@ def run_slot(scope: Scope, name: str, then: Callable[[], None]) -> None:
     elif name == "enable":
         enable_scope(scope, then)
     else:
-        _each(scope.members, lifecycle.reset, then)
+        _each(scope.members, node_lifecycle.reset, then)
 
 
-def _each(workers: Iterable[Worker], action: Action, then: Callable[[], None]) -> None:
+def _each(workers: Iterable[RunningNode], action: Action, then: Callable[[], None]) -> None:
     """Do it to those at rest, one after the other in order of adding; who is amid a firing or call follows after it.
 
     Without recursion, for there may be thousands.
@@ -53,8 +53,8 @@ def _each(workers: Iterable[Worker], action: Action, then: Callable[[], None]) -
             return
         inside = True
         for worker in rest:
-            if worker.busy or worker.is_flying():
-                when_idle(worker, action, lifecycle.nothing)
+            if worker.busy or worker.has_concurrent_code():
+                when_idle(worker, action, node_lifecycle.nothing)
                 continue
             done_inside = False
             when_idle(worker, action, step)
@@ -72,10 +72,10 @@ def disable_scope(scope: Scope) -> None:
         return
     scope.enabled = False
     core = scope.worker.core
-    if core.seldom is not None and _is_alone_in_it(scope):
-        core.seldom(NodeEnabled(core.now(), scope.path, False))
+    if core.trace_changes is not None and _is_alone_in_it(scope):
+        core.trace_changes(NodeEnabled(core.now(), scope.path, False))
     wiring.refresh_via(scope)
-    lifecycle.disable_around((*scope.inside(), scope.worker))
+    node_lifecycle.disable_around((*scope.inside(), scope.worker))
     derive_scopes(core)
 
 
@@ -89,19 +89,19 @@ def _is_alone_in_it(scope: Scope) -> bool:
     return True
 
 
-def enable_scope(scope: Scope, then: Callable[[], None], fresh: Collection[Worker] = ()) -> None:
+def enable_scope(scope: Scope, then: Callable[[], None], fresh: Collection[RunningNode] = ()) -> None:
     """Enable the subgraph: nodes that were not disabled themselves start afresh, unless they are `fresh` already."""
     if scope.enabled or scope.worker is None:
         then()
         return
     scope.enabled = True
     core = scope.worker.core
-    if core.seldom is not None and _is_alone_in_it(scope):
-        core.seldom(NodeEnabled(core.now(), scope.path, True))
+    if core.trace_changes is not None and _is_alone_in_it(scope):
+        core.trace_changes(NodeEnabled(core.now(), scope.path, True))
     wiring.refresh_via(scope)
     for owner in (*scope.inside(), scope.worker):
         if owner.scope is not None and all(one.enabled for one in owner.around):
-            lifecycle.enable_around(owner)
+            node_lifecycle.enable_around(owner)
 
     def finished() -> None:
         for worker in scope.members:
@@ -111,5 +111,5 @@ def enable_scope(scope: Scope, then: Callable[[], None], fresh: Collection[Worke
     meant = [worker for worker in scope.members if worker.own_enabled and all(one.enabled for one in worker.around)]
     for worker in meant:
         if worker in fresh:
-            lifecycle.enable(worker, lifecycle.nothing, fresh=True)
-    _each([worker for worker in meant if worker not in fresh], lifecycle.enable, finished)
+            node_lifecycle.enable(worker, node_lifecycle.nothing, fresh=True)
+    _each([worker for worker in meant if worker not in fresh], node_lifecycle.enable, finished)

@@ -7,7 +7,7 @@ Called when the plan is made and when something is enabled, disabled, ended or e
 from __future__ import annotations
 
 from hfg.engine.model import Scope
-from hfg.engine.model.worker import DISABLED, UNWIRED, Worker
+from hfg.engine.model.running_node import DISABLED, UNWIRED, RunningNode
 from hfg.engine.rules.agenda import consider, note_full
 from hfg.engine.rules.listening import find_listeners
 from hfg.ports.edges import AnyEdge, Edge, EventEdge
@@ -28,7 +28,7 @@ def reaches(edge: Edge) -> bool:
     return all(scope.enabled for scope in edge.via if scope not in around)
 
 
-def refresh(worker: Worker) -> None:
+def refresh(worker: RunningNode) -> None:
     """Derive anew what is live around a worker: it and its neighbours."""
     touched = {worker.index: worker}
     for edge in worker.edges_in():
@@ -57,7 +57,7 @@ def refresh_via(scope: Scope) -> None:
             rewire(edge.target)
 
 
-def rewire(worker: Worker) -> None:
+def rewire(worker: RunningNode) -> None:
     """Derive what a worker waits for and sends on from the liveness of its edges; its step is chosen anew."""
     worker.rewire(tuple(edge for edge in worker.in_edges if _is_waited_for(edge)))
     find_listeners(worker)
@@ -77,7 +77,7 @@ def _is_waited_for(edge: AnyEdge) -> bool:
     return edge.live or (type(edge) is EventEdge and bool(edge.queue))  # what was sent before is delivered (F10)
 
 
-def _may_fire(worker: Worker) -> bool:
+def _may_fire(worker: RunningNode) -> bool:
     """F1: whether it is a source or has a live input, and each mandatory input has a live edge, or has had END."""
     if worker.process is None or not (worker.is_source or worker.live_inputs):
         return False

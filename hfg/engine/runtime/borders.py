@@ -14,10 +14,10 @@ from itertools import islice
 from typing import Any, Literal, TypeAlias
 
 from hfg.base.token import END, Token
-from hfg.engine.model.worker import DISABLED, ENDED, Worker
+from hfg.engine.model.running_node import DISABLED, ENDED, RunningNode
 from hfg.engine.rules.ending import drain_left
-from hfg.engine.rules.lifecycle import disable_around, enable_around
-from hfg.engine.rules.quiet import node_ended
+from hfg.engine.rules.node_lifecycle import disable_around, enable_around
+from hfg.engine.rules.quiescence import node_ended
 from hfg.engine.rules.releasing import take_from_reader
 from hfg.engine.rules.sending import enqueue, put_arrived
 from hfg.engine.rules.wiring import reaches
@@ -43,7 +43,7 @@ class Outlet:
     """
 
     def __init__(
-        self, engine: Engine, worker: Worker, *, keeps: bool, wake: Callable[[], None], drains: bool = True
+        self, engine: Engine, worker: RunningNode, *, keeps: bool, wake: Callable[[], None], drains: bool = True
     ) -> None:
         """Stand there.
 
@@ -71,8 +71,8 @@ class Outlet:
         self.taken = 0
         self.left = 0
 
-        def step(worker: Worker) -> None:
-            worker.no_turn()
+        def step(worker: RunningNode) -> None:
+            worker.use_turn()
             wake()
 
         worker.run_by(step)
@@ -212,7 +212,7 @@ class Inlet:
       speaking: whether their producer is enabled, as far as is known here.
     """
 
-    def __init__(self, engine: Engine, worker: Worker, moved: Callable[[Inlet], None]) -> None:
+    def __init__(self, engine: Engine, worker: RunningNode, moved: Callable[[Inlet], None]) -> None:
         """Stand there.
 
         Args:
@@ -236,7 +236,7 @@ class Inlet:
         self._done = 0  # of those, in the part, with all that came of them
         self._orphans = 0  # of so many the producer has died and left nobody who waits for them to be done
 
-        def step(worker: Worker) -> None:
+        def step(worker: RunningNode) -> None:
             worker.dequeued()
             self.lay()
 

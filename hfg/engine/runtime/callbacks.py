@@ -1,7 +1,7 @@
 """What an engine tells those who stand on it: the only way from here up (rules R3, R4, R7).
 
 They put in what they want to be called; the engine knows none of them, and without them a run is the same. What the
-deciding modules ask of those above them, and need an answer to, is another table: `core.Upstairs`.
+deciding modules ask of those above them, and need an answer to, is another table: `core.RuleCallbacks`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence, Set
 
 import msgspec
 
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.nodetypes.node import Node
 from hfg.ports.edges import EventEdge
 
@@ -26,7 +26,7 @@ class Edited(msgspec.Struct, frozen=True):
       nodes: at which something is not as it was, also those that are gone.
     """
 
-    workers: Sequence[Worker]
+    workers: Sequence[RunningNode]
     swapped: Mapping[Node, Node]
     nodes: Set[object]
 

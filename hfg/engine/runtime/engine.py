@@ -16,20 +16,20 @@ from typing import Any
 
 from hfg.base.clock import current_clock, current_elapsed
 from hfg.base.logs import Log, current_log
+from hfg.engine.executing.asking import log_of_running_code
 from hfg.engine.executing.code import CodeRunner, answer
 from hfg.engine.executing.groups import CheckedTurn, Dispatching, LoopGroup, SideGroup, ThreadGroup
-from hfg.engine.executing.speaking import log_of_speaker
 from hfg.engine.executing.tasks import TaskRunner
 from hfg.engine.executing.virtual import VirtualTimeLoop
-from hfg.engine.model import Core, Doing, Group, Worker
+from hfg.engine.model import Core, Doing, Group, RunningNode
 from hfg.engine.model.invariants import check_invariants
 from hfg.engine.model.policies import make_policy
 from hfg.engine.model.sharing import Sharing
-from hfg.engine.rules import iterating, quiet, rings
+from hfg.engine.rules import iterating, quiescence, rings
 from hfg.engine.runtime import plan, rx
 from hfg.engine.runtime.callbacks import Callbacks
+from hfg.engine.runtime.rule_functions import RuleFunctions
 from hfg.engine.runtime.settings import Settings
-from hfg.engine.runtime.upstairs import Deciders
 from hfg.errors import EngineInternalError, HfgError, NodeError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph
@@ -115,8 +115,8 @@ class Engine:
         self.context = contextvars.copy_context()
         self.context.run(current_clock.set, self.now)
         self.context.run(current_elapsed.set, self.elapsed)
-        self.context.run(current_log.set, lambda: log_of_speaker(self.core))
-        self.core: Core = Core(self, Deciders())
+        self.context.run(current_log.set, lambda: log_of_running_code(self.core))
+        self.core: Core = Core(self, RuleFunctions())
         self.callbacks = Callbacks()
         self.core.debug = settings.debug
         if settings.debug:
@@ -128,9 +128,9 @@ class Engine:
         self.graph: Graph = graph_of(flat.graph)
         self._slice_s = _SLICE_S
         self.holds = 0
-        self.readers: list[Worker] = []
-        self.read_out: set[Worker] = set()
-        self.senders: list[Worker] = []  # feeds for which somebody outside has a token, once for each
+        self.readers: list[RunningNode] = []
+        self.read_out: set[RunningNode] = set()
+        self.senders: list[RunningNode] = []  # feeds for which somebody outside has a token, once for each
         self._told_unread: set[str] = set()
         self._quiet_waiters: list[asyncio.Future[None]] = []
         self._agreement: Callable[[], None] | None = None
@@ -216,13 +216,13 @@ class Engine:
         """See `Host`."""
         self.loop.call_soon(callback, context=self.context)
 
-    def start_task(self, worker: Worker, coroutine: Coroutine[Any, Any, Any], doing: Doing | None = None) -> None:
+    def start_task(self, worker: RunningNode, coroutine: Coroutine[Any, Any, Any], doing: Doing | None = None) -> None:
         """See `Host`."""
         self.tasks.start(worker, coroutine, doing)
 
     # --- groups -----------------------------------------------------------------------------------------------------
 
-    def worker_of(self, node: Node | Graph) -> Worker:
+    def worker_of(self, node: Node | Graph) -> RunningNode:
         """Find who runs a node, or what stands for the graph itself.
 
         Raises:
@@ -364,11 +364,11 @@ class Engine:
         except KeyboardInterrupt:
             raise
         except BaseException as error:
-            self.misused(core.current or core.speaker, error)
+            self.misused(core.current or core.running_node, error)
         finally:
             core.pumping = False
-            core.current = core.speaker = None
-            self._loop_group.give_turns(1)
+            core.current = core.running_node = None
+            self._loop_group.set_budget(1)
 
     def _waits_for_work(self) -> bool:
         """R5, R1: a loop that is always busy must not keep out what comes back from threads.
@@ -381,12 +381,12 @@ class Engine:
 
     def _rests(self) -> bool:
         """R3: paused, so nothing new starts: it is quiet when nothing is under way, but does not end by that."""
-        if self.core.held:
+        if self.core.paused:
             if not self.core.in_flight and not self.core.tasks:
                 self._answer_quiet()
             for call in self.callbacks.rested:
                 call()
-        return self.core.held
+        return self.core.paused
 
     def internal_fault(self, error: BaseException) -> None:
         """A fault of ours must end the run, not hang it."""
@@ -399,7 +399,7 @@ class Engine:
             problem.__cause__ = error
         self.finish("failed", problem)
 
-    def misused(self, worker: Worker | None, error: BaseException, what: str = "its code") -> None:
+    def misused(self, worker: RunningNode | None, error: BaseException, what: str = "its code") -> None:
         """A node's code raised what is no error but Python's way to end a task or the program: without us a hang."""
         problem = NodeError(worker.path if worker is not None else "", what, error)
         problem.__cause__ = error
@@ -414,7 +414,7 @@ class Engine:
         except Exception as error:
             self.internal_fault(error)
         except BaseException as error:
-            self.misused(self.core.current or self.core.speaker, error)
+            self.misused(self.core.current or self.core.running_node, error)
 
     def _drain(self, policy: Any, group: Group, ready_groups: deque[Dispatching]) -> None:
         """Step what is queued until nothing is, or the slice is over; short drains do not look at the clock.
@@ -424,10 +424,10 @@ class Engine:
         """
         core, flags, take = self.core, self.core.flags, group.take
         until = core.until = self.now() + self._slice_s
-        group.give_turns(_SLICE_STEPS)
+        group.set_budget(_SLICE_STEPS)
         while True:
             if ready_groups:
-                group.give_turns(max(group.turns - ready_groups.popleft().dispatch(), 1))
+                group.set_budget(max(group.budget - ready_groups.popleft().dispatch(), 1))
             if policy:
                 worker = take()
                 step = worker.step  # what is called as a field is looked up the slow way
@@ -438,11 +438,11 @@ class Engine:
                 return
             if flags and core.ends_slice():
                 return
-            group.turns -= 1
-            if not group.turns:
+            group.budget -= 1
+            if not group.budget:
                 if self.now() >= until:
                     return
-                group.give_turns(_SLICE_STEPS)
+                group.set_budget(_SLICE_STEPS)
 
     def give_way(self, call: Callable[[], None]) -> None:
         """Code has given way to others for a moment (`sleep(0)`): let it go on behind all that is ready now.
@@ -465,10 +465,10 @@ class Engine:
         """
         core, flags, take = self.core, self.core.flags, group.take
         instant = self.loop.time()
-        core.followed = 0
+        core.ran_next = 0
         for _ in range(_VIRTUAL_SLICE_WAVES // _VIRTUAL_LOOK_WAVES):
-            group.give_turns(_VIRTUAL_LOOK_WAVES)
-            while group.turns > 0:
+            group.set_budget(_VIRTUAL_LOOK_WAVES)
+            while group.budget > 0:
                 if ready_groups:
                     ready_groups.popleft().dispatch()
                 if policy:
@@ -479,10 +479,10 @@ class Engine:
                     return
                 if flags and core.ends_slice():
                     return
-                group.turns -= 1
-                if group.turns <= 0:
-                    group.give_turns(group.turns + core.followed)
-                    core.followed = 0
+                group.budget -= 1
+                if group.budget <= 0:
+                    group.set_budget(group.budget + core.ran_next)
+                    core.ran_next = 0
             self.beside_work += 1
             if self.loop.time() != instant:  # code has spent time: what is due by now has its turn
                 return
@@ -513,16 +513,17 @@ class Engine:
         if core.timers:
             return
         if (core.in_flight or core.tasks) and not (
-            (core.futile and self._only_futile_works()) or (core.waiting_room and quiet.only_waiting_for_room(core))
+            (core.dead_sources and self._only_dead_sources_work())
+            or (core.waiting_room and quiescence.only_waiting_for_room(core))
         ):
             return
         self.quiet()
 
-    def _only_futile_works(self) -> bool:
+    def _only_dead_sources_work(self) -> bool:
         """R5: only sources that feed ended nodes are under way, and nobody stands behind them in their group."""
         if any(isinstance(group, ThreadGroup) and len(group.policy) for group in self.groups.values()):
             return False
-        return quiet.only_futile_in_flight(self.core, threads_too=not self.virtual)
+        return quiescence.only_dead_sources_in_flight(self.core, threads_too=not self.virtual)
 
     def quiet(self) -> None:
         """Nothing runs, nothing can start, no timer is pending (P9, F13, R5)."""
@@ -537,7 +538,7 @@ class Engine:
             return
         if self.give_up() or self.complete_operators() or core.timers > 0 or self.end_events():
             return
-        stalled = quiet.stall(core)
+        stalled = quiescence.stall(core)
         self.finish("done" if stalled is None else "stalled", stalled)
 
     def leave_quiet_to(self, agreement: Callable[[], None]) -> None:
@@ -556,15 +557,15 @@ class Engine:
 
     def give_up(self) -> bool:
         """R5: sources that work for nobody count as ended; whether there were any."""
-        return self._kicked(quiet.give_up(self.core))
+        return self._kicked(quiescence.give_up(self.core))
 
     def complete_operators(self) -> bool:
         """P9: whether operators on edges had something left to give out."""
-        return self._kicked(quiet.complete_operators(self.core))
+        return self._kicked(quiescence.complete_operators(self.core))
 
     def end_events(self) -> bool:
         """F13: whether END was sent to inputs that nothing comes to any more."""
-        return self._kicked(quiet.end_events(self.core))
+        return self._kicked(quiescence.end_events(self.core))
 
     def _kicked(self, moves: bool) -> bool:
         if moves:
@@ -573,7 +574,7 @@ class Engine:
 
     def _tell_unread(self) -> None:
         """P10: a graph that stands still for want of a reader looks like any quiet one, so that is told, once."""
-        for worker in quiet.unread(self.core, self.readers):
+        for worker in quiescence.unread(self.core, self.readers):
             name = worker.port_name
             if name not in self._told_unread:
                 self._told_unread.add(name)
@@ -625,7 +626,7 @@ class Engine:
             region.interrupt()
         self._ended = self.loop.time()
         for worker in self.core.workers:
-            worker.run_over()
+            worker.on_run_ended()
         for call in self.callbacks.finished:
             call()
         self._answer_quiet()

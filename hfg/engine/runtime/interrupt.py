@@ -22,7 +22,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
-from hfg.engine.runtime.lifetime import Lifetime
+from hfg.engine.runtime.run_lifecycle import RunLifecycle
 from hfg.errors import HfgError
 from hfg.graph import Graph
 
@@ -46,14 +46,14 @@ class CtrlC:
     Attributes:
       count: how often it was pressed.
       task: what it cancels; set by the task itself.
-      lifetime: of the run that is cancelled.
+      run_lifecycle: of the run that is cancelled.
       error: what that run failed with.
     """
 
     def __init__(self) -> None:
         self.count = 0
         self.task: asyncio.Task[Any] | None = None
-        self.lifetime: Lifetime | None = None
+        self.run_lifecycle: RunLifecycle | None = None
         self.error: Callable[[], HfgError | None] = lambda: None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._noticed = threading.Event()
@@ -92,8 +92,8 @@ class CtrlC:
             raise KeyboardInterrupt
         self.count += 1
         if self.count > 1 or self.task is None or self._loop is None:
-            if self.lifetime is not None:
-                self.lifetime.leave_now()
+            if self.run_lifecycle is not None:
+                self.run_lifecycle.leave_now()
             raise KeyboardInterrupt
         threading.Thread(target=self._insist, name="hfg interrupt", daemon=True).start()
         self._loop.call_soon_threadsafe(self._cancel)

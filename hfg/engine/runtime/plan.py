@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hfg.engine.model import Core, Gate, Group, Iteration, Scope
-from hfg.engine.model.worker import DISABLED, STARTING, UNWIRED, Worker
+from hfg.engine.model.running_node import DISABLED, STARTING, UNWIRED, RunningNode
 from hfg.engine.rules.wiring import is_live, rewire
 from hfg.errors import GraphError, UsageError
 from hfg.graph.flat import LINK, End, FlatEdge, FlatGraph, FlatNode, scope_end
@@ -55,7 +55,7 @@ def build(core: Core, flat: FlatGraph, groups: Mapping[str, Group], *, loop: Gro
     if len(parts) > 1:
         leaves.sort(key=lambda worker: node_place(worker.node))
         owners.sort(key=lambda owner: node_place(owner.node))
-    boundary = core.boundary = Worker(core, "", None, None, loop)
+    boundary = core.boundary = RunningNode(core, "", None, None, loop)
     core.workers += [*leaves, *owners, boundary]
     for part in parts:
         ends = Ends(core, loop, part.around, part.workers, part.scopes)
@@ -99,9 +99,9 @@ class _Part:
     def __init__(self, flat: FlatGraph, around: Iteration | None) -> None:
         self.flat = flat
         self.around = around
-        self.workers: list[Worker] = []
+        self.workers: list[RunningNode] = []
         self.scopes: list[Scope] = []
-        self.owners: list[Worker] = []
+        self.owners: list[RunningNode] = []
 
     def make_workers(self, core: Core, groups: Mapping[str, Group], loop: Group) -> None:
         """Make the workers of nodes and subgraphs; each node knows those around it, outermost first."""
@@ -128,11 +128,11 @@ class _Part:
             core.gates.append(Gate(state, flat_gate.idle_rate_hz, gated))
 
 
-def add_scope(core: Core, flat_scope: FlatScope, parent: Scope | None, loop: Group) -> tuple[Scope, Worker]:
+def add_scope(core: Core, flat_scope: FlatScope, parent: Scope | None, loop: Group) -> tuple[Scope, RunningNode]:
     """Make a subgraph, and the worker on which its automatic ports live."""
     options = flat_scope.options
     scope = Scope(flat_scope.index, flat_scope.path, parent, enabled=options.enabled)
-    owner = Worker(core, flat_scope.path, flat_scope.subgraph, None, loop)
+    owner = RunningNode(core, flat_scope.path, flat_scope.subgraph, None, loop)
     owner.stand_for(scope, options.active_for_s)
     core.by_path[owner.path] = owner
     return scope, owner
@@ -157,7 +157,7 @@ class Ends:
         core: Core,
         loop: Group,
         around: Iteration | None = None,
-        workers: Sequence[Worker] = (),
+        workers: Sequence[RunningNode] = (),
         scopes: Sequence[Scope] = (),
     ) -> None:
         self.core = core
@@ -166,7 +166,7 @@ class Ends:
         self._workers = workers
         self._scopes = scopes
 
-    def of(self, end: End) -> Worker:
+    def of(self, end: End) -> RunningNode:
         """Give the worker."""
         if end.node >= 0:
             return self._workers[end.node]
@@ -187,16 +187,16 @@ class Ends:
         else:
             edge.join(self.of(flat.source), self.of(flat.target))
 
-    def _outlet(self, name: str, group: Group) -> Worker:
-        outlet = Worker(self.core, "", None, None, self.loop if group.threaded else group)
+    def _outlet(self, name: str, group: Group) -> RunningNode:
+        outlet = RunningNode(self.core, "", None, None, self.loop if group.threaded else group)
         outlet.be_graph_output(name)
         self.core.workers.append(outlet)
         self.core.outlets.append(outlet)
         return outlet
 
-    def _inlet(self, end: End, group: Group) -> Worker:
+    def _inlet(self, end: End, group: Group) -> RunningNode:
         """It is in the group of who takes from it: what it lays down is processed when all that follows is (F5)."""
-        inlet = Worker(self.core, "", None, None, group)
+        inlet = RunningNode(self.core, "", None, None, group)
         if end.kind == "event":
             inlet.stand_outside(end.name)
         else:
@@ -210,7 +210,7 @@ class Ends:
         """Give the scopes through whose ports an edge passes."""
         return tuple(self._scopes[scope] for scope in flat.via)
 
-    def at_border(self, end: End, around: Iteration | None) -> Worker:
+    def at_border(self, end: End, around: Iteration | None) -> RunningNode:
         """Give who stands for a port of the graph itself, or for the inner side of one of what iterates."""
         border = self.core if around is None else around
         if end.kind == "output":
@@ -224,7 +224,7 @@ class Ends:
         assert self.core.boundary is not None
         return self.core.boundary
 
-    def _feed(self, border: Core | Iteration, name: str, around: Iteration | None) -> Worker:
+    def _feed(self, border: Core | Iteration, name: str, around: Iteration | None) -> RunningNode:
         feed = self._make()
         feed.be_graph_input(name)
         border.feeds.append(feed)
@@ -232,7 +232,7 @@ class Ends:
             feed.lie_within(around)
         return feed
 
-    def _reader(self, border: Core | Iteration, name: str, around: Iteration | None) -> Worker:
+    def _reader(self, border: Core | Iteration, name: str, around: Iteration | None) -> RunningNode:
         reader = self._make()
         reader.be_graph_output(name)
         border.readers.append(reader)
@@ -240,21 +240,21 @@ class Ends:
             around.join(reader)
         return reader
 
-    def _make(self) -> Worker:
-        worker = Worker(self.core, "", None, None, self.loop)
+    def _make(self) -> RunningNode:
+        worker = RunningNode(self.core, "", None, None, self.loop)
         self.core.workers.append(worker)
         return worker
 
 
-def _known(border: Sequence[Worker], name: str) -> Worker | None:
+def _known(border: Sequence[RunningNode], name: str) -> RunningNode | None:
     return next((worker for worker in border if worker.port_name == name), None)
 
 
-def make_worker(core: Core, flat_node: FlatNode, groups: Mapping[str, Group]) -> Worker:
+def make_worker(core: Core, flat_node: FlatNode, groups: Mapping[str, Group]) -> RunningNode:
     """Make the worker of a node; it has no edges yet."""
     options = flat_node.options
     group = groups[options.group or "loop"]
-    worker = Worker(core, flat_node.path, flat_node.node, options, group)
+    worker = RunningNode(core, flat_node.path, flat_node.node, options, group)
     worker.fit(flat_node.node)
     if options.iterate_over:
         worker.iterate(Iteration(worker))
@@ -300,8 +300,8 @@ def describe(edge: Any, flat: FlatEdge, ends: Ends) -> None:
 
 def wire(edge: Any, flat: FlatEdge) -> None:
     """Lead an edge from its source to its target, in its place in the order."""
-    source: Worker = edge.source
-    target: Worker = edge.target
+    source: RunningNode = edge.source
+    target: RunningNode = edge.target
     target.lead_in(edge, flat.target.kind, flat.target.name)
     if flat.source.kind == "event":
         source.lead_out_of_event(edge, flat.source.name, flat.source.port)
@@ -324,13 +324,13 @@ def derive_release(edge: Any) -> None:
     """Find out when a token on an edge is processed, and whether what it enables goes next (F5, R2)."""
     if type(edge) is not EventEdge:
         sequential = _is_sequential(edge)
-        edge.be_released(sequential=sequential, follows=sequential and _stays(edge))
+        edge.be_released(sequential=sequential, depth_first=sequential and _stays(edge))
 
 
 def _is_sequential(edge: Any) -> bool:
     """F5: the consumer's mode; `auto` is sequential within a group. A delay ends the wave whatever the mode (P7)."""
-    target: Worker = edge.target
-    release = target.options.release if target.options is not None and target.flights is None else "pipelined"  # F14
+    target: RunningNode = edge.target
+    release = target.options.release if target.options is not None and target.concurrent is None else "pipelined"  # F14
     if type(edge) is BufferEdge and edge.initial:
         return False
     if release == "auto":
@@ -340,16 +340,16 @@ def _is_sequential(edge: Any) -> bool:
 
 def _stays(edge: Any) -> bool:
     """R2: within a group that goes depth first; what comes from outside is a wave of its own."""
-    source: Worker = edge.source
-    target: Worker = edge.target
+    source: RunningNode = edge.source
+    target: RunningNode = edge.target
     return source.options is not None and source.group is target.group and source.group.depth_first
 
 
-def prepare_slot(worker: Worker, name: str) -> EventEdge:
+def prepare_slot(worker: RunningNode, name: str) -> EventEdge:
     """Make the edge by which signals come into a slot from outside the graph; it counts as active (P10, A4)."""
     core = worker.core
     edge = EventEdge(core.edges[-1].index + 1 if core.edges else 0, outside_label(worker, name), True)
-    outside = Worker(core, "", None, None, worker.group)
+    outside = RunningNode(core, "", None, None, worker.group)
     outside.block(UNWIRED)  # it never fires; only its queue may be full
     edge.join(outside, worker)
     worker.lead_in(edge, "slot", name)
@@ -363,7 +363,7 @@ def prepare_slot(worker: Worker, name: str) -> EventEdge:
     return edge
 
 
-def outside_label(worker: Worker, slot: str) -> str:
+def outside_label(worker: RunningNode, slot: str) -> str:
     """What the edge is called by which signals come into a slot from outside."""
     return f"outside -> {worker.path}.{slot}" if worker.path else f"outside -> {slot}"
 

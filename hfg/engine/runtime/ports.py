@@ -11,8 +11,8 @@ from typing import Any
 
 from hfg.base.token import Token
 from hfg.engine.fusion import slots
-from hfg.engine.model import RunningEvent, Worker
-from hfg.engine.rules import beside, concurrency, firing
+from hfg.engine.model import RunningEvent, RunningNode
+from hfg.engine.rules import concurrency, firing, task_ports
 from hfg.engine.rules.sending import trigger
 from hfg.engine.rules.sharing import need_unwritten
 from hfg.engine.runtime import plan, relays
@@ -25,19 +25,19 @@ from hfg.types import accepts, describe, describe_value
 __all__ = ["bind", "bind_automatic", "bind_event", "bind_start", "release_ports"]
 
 
-def bind(worker: Worker) -> None:
+def bind(worker: RunningNode) -> None:
     """Install the run's functions on all ports through which the node's code can send."""
     node = worker.node
     node_type = worker.type
     if node is None or worker.silent_code:
         return
     if worker.scope is None:
-        node._start_task = partial(worker.core.host.start_task, worker)
+        node._start_task = partial(worker.core.runtime.start_task, worker)
     ports = node.ports
     for position, name in enumerate(node_type.outputs):
-        beyond_one = worker.flights is not None
+        beyond_one = worker.concurrent is not None
         emit = partial(concurrency.write, worker, position) if beyond_one else firing.writer(worker, position)
-        ports.outputs[name]._emit = emit if worker.tasks is None else beside.refusing(worker, position, emit)
+        ports.outputs[name]._emit = emit if worker.tasks is None else task_ports.refusing(worker, position, emit)
     for name in node_type.events:
         bind_event(worker, name)
     for name, spec in node_type.parameters.items():
@@ -45,28 +45,28 @@ def bind(worker: Worker) -> None:
             ports.parameters[name]._tell = partial(_show, worker, name)
 
 
-def _show(worker: Worker, name: str, value: Any) -> None:
+def _show(worker: RunningNode, name: str, value: Any) -> None:
     """R7: a node has set what it alone sets; whoever watches sees it, from a thread in order with what it sends."""
     core = worker.core
     if core.trace is None:
         return
-    if core.host.on_loop():
+    if core.runtime.on_loop():
         _trace_set(worker, name, value)
         return
     tell = partial(_trace_set, worker, name, value)
     try:
         worker.group.signal(tell)  # type: ignore[attr-defined]
     except (AttributeError, UsageError):  # a thread of the node's own
-        core.host.bring_in(tell)
+        core.runtime.bring_in(tell)
 
 
-def _trace_set(worker: Worker, name: str, value: Any) -> None:
+def _trace_set(worker: RunningNode, name: str, value: Any) -> None:
     core = worker.core
     if core.trace is not None:
         core.trace(ParameterSet(core.now(), worker.path, name, value))
 
 
-def bind_event(worker: Worker, name: str) -> RunningEvent:
+def bind_event(worker: RunningNode, name: str) -> RunningEvent:
     """Make the running event of a declared or automatic event, and let the port trigger it."""
     event = worker.events.get(name)
     relayed = worker.scope is not None and not is_automatic_event(name)
@@ -79,14 +79,14 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
         return event
     port = worker.node.ports.events[name]
     event.bind(port)
-    host = worker.core.host
+    host = worker.core.runtime
     if relayed:
         host.adopt_event(port)
         return event
     port.__dict__.pop("trigger", None)  # the fast path, if it had one where it ran before (R4)
     if worker.group.threaded:
         port._emit = partial(_from_thread, worker, event)
-    elif worker.core.debug or any(one is not None for one in (worker.flights, worker.attempts, worker.tasks)):
+    elif worker.core.debug or any(one is not None for one in (worker.concurrent, worker.attempts, worker.tasks)):
         emit = slots.emitter(event, plainly=True)
         port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     else:
@@ -94,11 +94,11 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
         port.trigger = emit  # in place of the method, which would only call it
         port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     port._emit_wait = partial(worker.core.code.trigger_wait, event)
-    if worker.flights is not None or worker.attempts is not None:
+    if worker.concurrent is not None or worker.attempts is not None:
         port._emit = concurrency.triggering(worker, port._emit)
         port._emit_wait = concurrency.triggering(worker, port._emit_wait)
     if worker.tasks is not None:
-        port._emit = beside.triggering(event, port._emit)
+        port._emit = task_ports.triggering(event, port._emit)
     if worker.core.debug:
         port._emit, port._emit_wait = _checked(worker, port, port._emit), _checked(worker, port, port._emit_wait)
     host.adopt_event(port)
@@ -112,7 +112,7 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
 
 
 def _checked(
-    worker: Worker, port: EventPort[Any], emit: Callable[..., Any]
+    worker: RunningNode, port: EventPort[Any], emit: Callable[..., Any]
 ) -> Callable[[Any, int | None, float | None], Any]:
     """In debug mode a signal's value must be of its event's type; none at all always is (T2)."""
 
@@ -124,11 +124,11 @@ def _checked(
             need_unwritten(worker, port.name, value)
         return emit(value, activity, stamp)
 
-    host = worker.core.host
+    host = worker.core.runtime
     return checked
 
 
-def bind_automatic(worker: Worker) -> None:
+def bind_automatic(worker: RunningNode) -> None:
     """Let the automatic events of a node.
 
     Subgraph or graph that have edges or subscribers be triggered and listened to.
@@ -145,26 +145,28 @@ def bind_automatic(worker: Worker) -> None:
             bind_event(worker, port.name)
 
 
-def _from_thread(worker: Worker, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
+def _from_thread(
+    worker: RunningNode, event: RunningEvent, value: Any, activity: int | None, stamp: float | None
+) -> None:
     """F3: a signal from a thread leaves at the loop's next pass, in order and before the outputs of its firing."""
-    host = worker.core.host
+    host = worker.core.runtime
     if host.on_loop():
         trigger(event, value, activity, stamp)
     else:
         worker.group.signal(partial(trigger, event, value, activity, stamp))  # type: ignore[attr-defined]
 
 
-def bind_start(boundary: Worker, port: EventPort[None]) -> RunningEvent | None:
+def bind_start(boundary: RunningNode, port: EventPort[None]) -> RunningEvent | None:
     """Let the graph's `start` reach its edges and subscribers; None if it has neither (A10)."""
     event = boundary.events.get("start")
     if event is None and port._observers:
         event = boundary.make_event("start", port)
     if event is not None:
-        boundary.core.host.adopt_event(port)
+        boundary.core.runtime.adopt_event(port)
     return event
 
 
-def release_ports(worker: Worker) -> None:
+def release_ports(worker: RunningNode) -> None:
     """The run is over: what the ports led to is gone, their subscribers are told."""
     node = worker.node
     if node is not None:

@@ -22,7 +22,7 @@ from reactivex.subject import Subject
 from typing_extensions import override
 
 from hfg.base.token import Token
-from hfg.engine.model import Host, Iteration
+from hfg.engine.model import Iteration, Runtime
 from hfg.engine.rules.errors import operator_failed
 from hfg.engine.rules.modifiers import drop
 from hfg.engine.rules.sending import enqueue
@@ -37,7 +37,7 @@ __all__ = ["RunScheduler", "feed_from_observable", "kick", "pipe_edge"]
 class RunScheduler(PeriodicScheduler):
     """Schedules on the run's clock, real or virtual; what it holds keeps the run from being quiet."""
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: Runtime) -> None:
         super().__init__()
         self._host = host
 
@@ -85,7 +85,7 @@ class _EdgeScheduler(RunScheduler):
     around it (G4).
     """
 
-    def __init__(self, host: Host, edge: EventEdge) -> None:
+    def __init__(self, host: Runtime, edge: EventEdge) -> None:
         super().__init__(host)
         self._edge = edge
         self._within: Iteration | None = edge.target.within
@@ -138,7 +138,7 @@ class _EdgeScheduler(RunScheduler):
             self._at_work = False
 
 
-def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Host) -> Callable[[], None]:
+def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Runtime) -> Callable[[], None]:
     """Put operators on an event edge, in front of its queue; gives back what takes them off."""
     newest: float | None = None
     subscription = SerialDisposable()
@@ -184,7 +184,7 @@ def kick(edge: EventEdge) -> None:
     """Something lies on the edge that came from outside a firing."""
     core = edge.target.core
     if not core.pumping:
-        core.host.kick()
+        core.runtime.kick()
 
 
 def feed_from_observable(

@@ -51,10 +51,10 @@ from hfg.parts.model.messages import (
     Untrue,
 )
 from hfg.parts.model.sieve import sieve
-from hfg.parts.running.carrier import Carrier
 from hfg.parts.running.channels import Channel, called
-from hfg.parts.running.keeping import Keeper, read
+from hfg.parts.running.checkpointing import Checkpointer, read
 from hfg.parts.running.part import Part
+from hfg.parts.running.part_links import PartLinks
 from hfg.parts.running.rings import sweep_run
 from hfg.parts.steering.serving import Serving
 from hfg.transport import Session
@@ -103,7 +103,7 @@ class Worker:
         self._has_begun = False
         self._asked = 0  # number of requests for the time without an answer
         self._part: Part | None = None
-        self._carrier: Carrier | None = None
+        self._carrier: PartLinks | None = None
         self._shares_memory = False
         self._serving: Serving | None = None
         self._is_closed = False
@@ -127,7 +127,7 @@ class Worker:
                 self._part.finish("cancelled", None)
                 if self._serving is not None:
                     self._serving.close()
-                await self._part.composition.lifetime.close()
+                await self._part.composition.run_lifecycle.close()
             await self._leave()
 
     async def _do(self, message: Message) -> None:
@@ -170,7 +170,7 @@ class Worker:
             assert self._serving is not None
             for call in message.calls:
                 self._serving.obey(call)
-            went_well = await part.composition.lifetime.set_up()
+            went_well = await part.composition.run_lifecycle.set_up()
         except HfgError as error:
             self._say(MAIN, Opened(self._name, as_failed(error)))
             return
@@ -215,7 +215,7 @@ class Worker:
         neighbours = {edge.source for edge in edges} | {edge.target for edge in edges}
         for other in neighbours - {self._name, MAIN}:
             self._channels[other] = self._channel_to(part, other, lives[other])
-        self._carrier = Carrier(
+        self._carrier = PartLinks(
             part,
             self._session,
             self._near,
@@ -229,12 +229,12 @@ class Worker:
         self._shares_memory = message.shares_memory
         return part
 
-    def _keeper(self, composition: Composition, kept: bytes | None, keeps_states: bool) -> Keeper:
+    def _keeper(self, composition: Composition, kept: bytes | None, keeps_states: bool) -> Checkpointer:
         def keep(number: int, data: bytes) -> None:
             self._say(MAIN, Keep(number, data))
 
         snapshot = None if kept is None else read(kept, self._name)
-        keeper = Keeper(self._name, composition.engine, keep, snapshot, keeps_states=keeps_states)
+        keeper = Checkpointer(self._name, composition.engine, keep, snapshot, keeps_states=keeps_states)
         keeper.check()
         return keeper
 
@@ -336,7 +336,7 @@ class Worker:
         if part is None:
             return
         try:
-            await part.composition.lifetime.close()
+            await part.composition.run_lifecycle.close()
         finally:
             if self._serving is not None:
                 self._serving.close()

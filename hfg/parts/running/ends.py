@@ -50,7 +50,7 @@ def _codec_of(edge: CutEdge) -> TokenCodec[Any]:
 
 
 class World(NamedTuple):
-    """Shared state of all near ends of a part; see `Carrier`."""
+    """Shared state of all near ends of a part; see `PartLinks`."""
 
     part: Part
     session: Session

@@ -17,7 +17,7 @@ from typing import Any, Final, Protocol
 from hfg.base.logs import Log
 from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.engine.face.composition import Composition
-from hfg.engine.rules import quiet, rings
+from hfg.engine.rules import quiescence, rings
 from hfg.engine.runtime.borders import Hearing, Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
 from hfg.errors import HfgError, RunError, UsageError
@@ -27,7 +27,7 @@ from hfg.parts.model.components import Component, is_synchronous
 from hfg.parts.model.inheriting import Arrived, Where
 from hfg.parts.model.messages import Untrue
 from hfg.parts.running.channels import called
-from hfg.parts.running.keeping import Keeper
+from hfg.parts.running.checkpointing import Checkpointer
 from hfg.parts.running.progress import Progress
 from hfg.ports.edges import EventEdge
 
@@ -90,7 +90,7 @@ class Part:
         inherited: frozenset[str] = frozenset(),
         remembered: frozenset[str] = frozenset(),
         returns: bool = False,
-        keeper: Keeper | None = None,
+        keeper: Checkpointer | None = None,
     ) -> None:
         """Make the part; nothing is set up yet.
 
@@ -221,7 +221,7 @@ class Part:
         if not self.inherits:
             yield
             return
-        if self.engine.core.held:
+        if self.engine.core.paused:
             raise UsageError(
                 f'group "{self.name}" is emptied of tokens before an edit, so that none is lost if its '
                 "process dies; but the run is paused: call run.resume() first"
@@ -254,7 +254,7 @@ class Part:
 
     def begin(self) -> None:
         """All parts are set up: start."""
-        self.composition.lifetime.begin()
+        self.composition.run_lifecycle.begin()
 
     def _begun(self) -> None:
         """The signals of `start` are on their edges: now comes what has come from other parts meanwhile."""
@@ -714,7 +714,7 @@ class Part:
     def answer(self, question: Question) -> Answer:
         """Do what follows from quiet, if the part still rests."""
         engine = self.engine
-        if not self._is_at_rest or question.rest != self._numbered or engine.core.over or engine.core.held:
+        if not self._is_at_rest or question.rest != self._numbered or engine.core.over or engine.core.paused:
             return Answer(self.name, question.step, question.rest, moved=True)
         return Answer(self.name, question.step, question.rest, value=self._do(question))
 
@@ -739,7 +739,7 @@ class Part:
             case "end":
                 return engine.end_events()
             case "stuck":
-                return quiet.stuck(engine.core)
+                return quiescence.stuck(engine.core)
             case "finish":
                 return self._finish(question.value)
 
@@ -762,7 +762,7 @@ class Part:
         raise Untrue(f'that queue "{label}" should grow, which does not exist here')
 
     def _finish(self, reasons: list[str]) -> None:
-        stalled = quiet.stalled(reasons) if reasons else None
+        stalled = quiescence.stalled(reasons) if reasons else None
         self.finish("done" if stalled is None else "stalled", stalled)
 
     def finish(self, outcome: str, error: HfgError | None) -> None:

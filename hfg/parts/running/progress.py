@@ -11,7 +11,7 @@ from typing import Any
 
 from hfg.base.token import END
 from hfg.engine.model import Core
-from hfg.engine.model.worker import ENDED, Worker
+from hfg.engine.model.running_node import ENDED, RunningNode
 from hfg.engine.runtime.borders import Inlet, Outlet
 from hfg.parts.model.inheriting import Alignment, Arrived, Inheritance, Where
 
@@ -62,7 +62,7 @@ class Progress:
         self.positions: dict[str, deque[Where]] = {label: deque() for label in self.leaving} if inherits else {}
         self._inheritance = Inheritance(self.coming)
         self._origin = dict.fromkeys(self.coming, 0)  # how many tokens came to former lives, or were passed over
-        self._last: list[Worker] = []
+        self._last: list[RunningNode] = []
         self._before: dict[Any, int] = {}  # what the ends had done when the part was edited last
 
     def look_for_last(self, core: Core) -> None:

@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any, Final
 
 from hfg.engine.editing.edits import Edits
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.errors import FileError, UsageError
 from hfg.graph import Graph
 from hfg.graph.editing import Transaction, history_of, prepare
@@ -87,7 +87,7 @@ class CutEdits:
     async def edit(self, commands: Sequence[Command]) -> None:
         """See `Run.edit`."""
         _refuse_copies(commands)
-        async with self._edits.turns.one():
+        async with self._edits.lock.one():
             said = encode(commands)
             where = self._concern(prepare(self._graph, commands, check=False).changes)
             for part in self._asking.others:
@@ -99,7 +99,7 @@ class CutEdits:
 
     async def undo(self) -> None:
         """See `Run.undo`."""
-        async with self._edits.turns.one():
+        async with self._edits.lock.one():
             transaction = self._need_known("undo", history_of(self._graph).next_undo())
             where = self._concern(undo_all(transaction.changes))
             gone = await self._carry_out(where, "undo", self._edits.undo_now, partial(draw_undo, self._graph))
@@ -107,7 +107,7 @@ class CutEdits:
 
     async def redo(self) -> None:
         """See `Run.redo`."""
-        async with self._edits.turns.one():
+        async with self._edits.lock.one():
             transaction = self._need_known("redo", history_of(self._graph).next_redo())
             for change in transaction.changes:
                 change.do()
@@ -143,10 +143,10 @@ class CutEdits:
         self,
         where: Concern,
         verb: str,
-        now: Callable[[], Awaitable[list[Worker]]],
+        now: Callable[[], Awaitable[list[RunningNode]]],
         drawn: Callable[[], None],
         **arguments: Any,
-    ) -> list[Worker]:
+    ) -> list[RunningNode]:
         """Make the edit where it takes effect, then have all others draw it. Return the nodes to tear down here."""
         history = history_of(self._graph)
         before = history.done[-1:], history.undone[-1:]

@@ -17,7 +17,7 @@ from hfg.base.token import Token
 from hfg.engine.editing.pausing import Breakpoint
 from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 from hfg.engine.observing.report import edge_reports, node_reports
 from hfg.errors import EngineInternalError, HfgError
 from hfg.graph import Graph
@@ -149,10 +149,10 @@ class Serving:
 
     # --- editing ----------------------------------------------------------------------------------------------------
 
-    async def _edit(self, now: Callable[[], Awaitable[list[Worker]]], empties: bool) -> None:
+    async def _edit(self, now: Callable[[], Awaitable[list[RunningNode]]], empties: bool) -> None:
         """Make the edit, and answer as soon as it is in effect; removed nodes are torn down afterwards."""
         edits = self._composition.edits
-        async with edits.turns.one(), self._emptied() if empties else nullcontext():
+        async with edits.lock.one(), self._emptied() if empties else nullcontext():
             gone = await now()
             self._crossing.draw(flatten(self._graph))
         leaving = asyncio.ensure_future(edits.leave(gone))

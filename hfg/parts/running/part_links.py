@@ -15,12 +15,12 @@ from hfg.parts.running.ends import IncomingEnd, OutgoingEnd, World
 from hfg.parts.running.part import Part
 from hfg.transport import Session
 
-__all__ = ["Carrier"]
+__all__ = ["PartLinks"]
 
 _LOGGER = Log("hfg.parts")
 
 
-class Carrier:
+class PartLinks:
     """Carries the tokens of a part over its edges to and from others."""
 
     def __init__(

@@ -11,27 +11,27 @@ import asyncio
 from collections.abc import Callable, Sequence
 
 from hfg.engine.executing.code import answer
-from hfg.engine.model.worker import REMOVED, Worker
-from hfg.engine.rules import lifecycle
-from hfg.engine.rules.sending import flush_automatic
+from hfg.engine.model.running_node import REMOVED, RunningNode
+from hfg.engine.rules import node_lifecycle
+from hfg.engine.rules.sending import send_automatic
 from hfg.engine.runtime.engine import Engine
 from hfg.errors import NotRunning
 from hfg.trace import EditWaits, StructureChanged
 
-__all__ = ["Held"]
+__all__ = ["Quiesced"]
 
 
-class Held:
+class Quiesced:
     """Holds nodes as they come to rest; inside the block all of them rest.
 
     Attributes:
       done: the edit has taken effect; else it was given up.
     """
 
-    def __init__(self, engine: Engine, workers: Sequence[Worker]) -> None:
+    def __init__(self, engine: Engine, workers: Sequence[RunningNode]) -> None:
         self._engine = engine
         self._workers = workers
-        self._held: dict[Worker, Callable[[], None]] = {}  # who rests, and what lets it go
+        self._held: dict[RunningNode, Callable[[], None]] = {}  # who rests, and what lets it go
         self._wanted = frozenset(workers)
         self._left = list(workers)  # who goes on until others rest, or until a queue has room
         self._waiter: asyncio.Future[None] = engine.loop.create_future()
@@ -40,10 +40,10 @@ class Held:
         self._said = False  # that it waits
         self._counts = False  # among what is in flight
 
-    async def __aenter__(self) -> Held:
+    async def __aenter__(self) -> Quiesced:
         engine = self._engine
         core = engine.core
-        core.holding = self
+        core.quiescing = self
         self._hold()
         if len(self._held) < len(self._workers):
             self._said = True
@@ -60,9 +60,9 @@ class Held:
         for worker in [worker for worker in self._left if not self._is_amid(worker)]:
             if worker in self._left:
                 self._left.remove(worker)
-                lifecycle.when_idle(worker, self._rests, lifecycle.nothing)
+                node_lifecycle.when_idle(worker, self._rests, node_lifecycle.nothing)
 
-    def _is_amid(self, worker: Worker) -> bool:
+    def _is_amid(self, worker: RunningNode) -> bool:
         """Whether it is inside of something that iterates, is to be held too, and is not yet."""
         around = worker.within
         while around is not None:
@@ -78,7 +78,7 @@ class Held:
             waiting = tuple(worker.path for worker in self._workers if worker not in self._left)
             core.trace(EditWaits(core.now(), waiting))
 
-    def _rests(self, worker: Worker, over: Callable[[], None]) -> None:
+    def _rests(self, worker: RunningNode, over: Callable[[], None]) -> None:
         """One of them has come to rest."""
         if self._given_up:
             over()
@@ -95,7 +95,7 @@ class Held:
                 self._say()
         elif len(self._held) == len(self._workers):
             if self._said:  # until we have our turn it is not quiet, or queues would grow (F8)
-                self._engine.core.set_out()
+                self._engine.core.begin_async()
                 self._counts = True
             answer(self._waiter, None)
 
@@ -125,7 +125,7 @@ class Held:
             ending.cancel()
             if self._counts:
                 self._counts = False
-                engine.core.come_back()
+                engine.core.end_async()
         if engine.core.over:
             raise NotRunning("the run ended before the edit could take effect; the graph is as it was")
 
@@ -135,12 +135,12 @@ class Held:
     def _let_go(self) -> None:
         core = self._engine.core
         self._given_up = True
-        core.holding = None
+        core.quiescing = None
         if not self.done and self._said and core.trace is not None and not core.over:
             core.trace(StructureChanged(core.now(), ""))
         for worker in self._workers if self.done else ():
             if not worker.blocked & REMOVED:
-                flush_automatic(worker)  # what activity that went back has raised (A8, A9)
+                send_automatic(worker)  # what activity that went back has raised (A8, A9)
         held, self._held = self._held, {}
         for over in held.values():
             over()

@@ -12,21 +12,21 @@ from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
 
 from hfg.engine.executing.code import whose_code
-from hfg.engine.model.current import current_flight, current_task
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.current import current_firing, current_task
+from hfg.engine.model.running_node import RunningNode
 from hfg.errors import UsageError
 
-__all__ = ["Turns"]
+__all__ = ["EditLock"]
 
 
-class Turns:
+class EditLock:
     """Who edits now, and who waits for that."""
 
     def __init__(self) -> None:
         self._taken = False
         self._waiting: deque[asyncio.Future[None]] = deque()
-        self._asking: dict[Worker, asyncio.Future[None]] = {}  # whose code waits for its turn
-        self._awaited: set[Worker] = set()  # the end of whose code the present edit waits for
+        self._asking: dict[RunningNode, asyncio.Future[None]] = {}  # whose code waits for its turn
+        self._awaited: set[RunningNode] = set()  # the end of whose code the present edit waits for
 
     @asynccontextmanager
     async def one(self) -> AsyncIterator[None]:
@@ -35,26 +35,26 @@ class Turns:
         Raises:
           UsageError: an edit waits for the end of the code that asks, or soon will.
         """
-        await self._take(_speaker())
+        await self._take(_asking_node())
         try:
             yield
         finally:
             self._awaited.clear()
             self._pass_on()
 
-    def wait_for(self, workers: Iterable[Worker], *, tasks_too: bool = False) -> None:
+    def wait_for(self, workers: Iterable[RunningNode], *, tasks_too: bool = False) -> None:
         """The present edit waits from now on for the code of these, and of nobody else, to come to its end.
 
         Args:
           workers: whose.
-          tasks_too: and of the tasks that it has started, for the nodes are torn down.
+          tasks_too: and of the tasks that it has firing, for the nodes are torn down.
 
         Raises:
           UsageError: it was asked for by the code of one of them.
         """
         self._awaited = set(workers)
         task = current_task.get()
-        speaker = task.worker if tasks_too and task is not None and task.is_current() else _speaker()
+        speaker = task.worker if tasks_too and task is not None and task.is_current() else _asking_node()
         if speaker in self._awaited:
             raise _waits_for_itself(speaker)
         for worker in [worker for worker in self._asking if worker in self._awaited]:
@@ -63,7 +63,7 @@ class Turns:
                 self._waiting.remove(waiter)
                 waiter.set_exception(_waits_for_itself(worker))
 
-    async def _take(self, speaker: Worker | None) -> None:
+    async def _take(self, speaker: RunningNode | None) -> None:
         if speaker is not None and speaker in self._awaited:
             raise _waits_for_itself(speaker)
         if not self._taken:
@@ -94,15 +94,15 @@ class Turns:
         self._taken = False
 
 
-def _speaker() -> Worker | None:
-    """Whose code asks; a task that it has started is nobody's, for nothing waits for that."""
+def _asking_node() -> RunningNode | None:
+    """Whose code asks; a task that it has firing is nobody's, for nothing waits for that."""
     worker = whose_code()
-    flight = current_flight.get()
-    carrier = None if worker is None else worker.execution.carrier if flight is None else flight.carrier
-    return worker if carrier is not None and carrier.task is asyncio.current_task() else None
+    firing = current_firing.get()
+    eager_task = None if worker is None else worker.execution.eager_task if firing is None else firing.eager_task
+    return worker if eager_task is not None and eager_task.task is asyncio.current_task() else None
 
 
-def _waits_for_itself(worker: Worker) -> UsageError:
+def _waits_for_itself(worker: RunningNode) -> UsageError:
     return UsageError(
         f'"{worker.path}" edits the graph in the middle of its code and would wait for ever, for the edit, or one '
         "before it, waits for the end of this code: do it in a task, asyncio.create_task(run.edit(...))"

@@ -13,53 +13,53 @@ from typing import Any, TypeAlias
 from hfg.base.token import Token
 from hfg.ports.edges import AnyEdge
 
-__all__ = ["FirstLiveLook", "Look", "WaveLook", "look_inside"]
+__all__ = ["BatchTap", "FirstLiveTap", "TokenTap", "tap_inside"]
 
-Look: TypeAlias = Callable[[Token[Any]], None]
+TokenTap: TypeAlias = Callable[[Token[Any]], None]
 
 
-class WaveLook(partial[None]):
+class BatchTap(partial[None]):
     """A look that can be told of all that has passed in a wave at its end; else it is called with each token.
 
     Attributes:
       place: what it looks at, for its own use.
-      together: called with five entries for each token, in the order in which they have passed: the place, the value
+      batch: called with five entries for each token, in the order in which they have passed: the place, the value
         (None: NO_MESSAGE), the stamp, the number on its edge, and when it passed, on the clock of the run. What passes
         so has activity 0.
     """
 
     place: object
-    together: Callable[[tuple[Any, ...]], None]
+    batch: Callable[[tuple[Any, ...]], None]
 
     @classmethod
-    def of(cls, look: Look, place: object, together: Callable[[tuple[Any, ...]], None]) -> WaveLook:
+    def of(cls, look: TokenTap, place: object, batch: Callable[[tuple[Any, ...]], None]) -> BatchTap:
         """Make one of what is called with each token."""
         made = cls(look)
-        made.place, made.together = place, together
+        made.place, made.batch = place, batch
         return made
 
 
-class FirstLiveLook(partial[None]):
+class FirstLiveTap(partial[None]):
     """Fan-out carries the same token on each edge: this looks at the first that is live only."""
 
     @classmethod
-    def of(cls, edges: Sequence[AnyEdge], edge: AnyEdge, look: Look) -> FirstLiveLook:
+    def of(cls, edges: Sequence[AnyEdge], edge: AnyEdge, look: TokenTap) -> FirstLiveTap:
         """Make what is called with each token of one of the edges."""
         return cls(_if_first, edges, edge, look)
 
-    def now(self) -> Look | None:
+    def now(self) -> TokenTap | None:
         """What it comes to as long as the same edges are live."""
         edges, edge, look = self.args
         return look if _is_first(edges, edge) else None
 
 
-def look_inside(edge: AnyEdge) -> Look | None:
+def tap_inside(edge: AnyEdge) -> TokenTap | None:
     """Who looks at an edge inside of a region, which lasts no longer than its edges are live."""
-    look: Look | None = edge.tap
-    return look.now() if isinstance(look, FirstLiveLook) else look
+    look: TokenTap | None = edge.tap
+    return look.now() if isinstance(look, FirstLiveTap) else look
 
 
-def _if_first(edges: Sequence[AnyEdge], edge: AnyEdge, look: Look, token: Token[Any]) -> None:
+def _if_first(edges: Sequence[AnyEdge], edge: AnyEdge, look: TokenTap, token: Token[Any]) -> None:
     if _is_first(edges, edge):
         look(token)
 

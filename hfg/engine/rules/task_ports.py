@@ -9,9 +9,9 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, TypeAlias
 
-from hfg.engine.model import RunningEvent, Worker
+from hfg.engine.model import RunningEvent, RunningNode
 from hfg.engine.model.current import current_task
-from hfg.engine.rules.sending import trigger_beside
+from hfg.engine.rules.sending import trigger_from_task
 from hfg.errors import UsageError
 
 __all__ = ["refusing", "triggering"]
@@ -19,7 +19,7 @@ __all__ = ["refusing", "triggering"]
 _Emit: TypeAlias = Callable[[Any, int | None, float | None], Any]
 
 
-def refusing(worker: Worker, position: int, emit: _Emit) -> _Emit:
+def refusing(worker: RunningNode, position: int, emit: _Emit) -> _Emit:
     """What writes to an output of a worker: its firings do, its tasks may not (F3)."""
 
     def write(value: Any, activity: int | None, stamp: float | None) -> Any:
@@ -37,7 +37,7 @@ def refusing(worker: Worker, position: int, emit: _Emit) -> _Emit:
 def triggering(event: RunningEvent, emit: _Emit) -> _Emit:
     """What triggers an event of a worker: for its tasks each signal is a sending of its own."""
     worker = event.worker
-    host = worker.core.host
+    host = worker.core.runtime
 
     def send(value: Any, activity: int | None, stamp: float | None) -> Any:
         task = current_task.get()
@@ -46,9 +46,9 @@ def triggering(event: RunningEvent, emit: _Emit) -> _Emit:
         if task.doing is not None and task.cancelled and activity is None:
             activity = 0  # what there is of activity by now is not that of its attempt (A15)
         if host.on_loop():
-            trigger_beside(event, value, activity, stamp)
+            trigger_from_task(event, value, activity, stamp)
         else:  # from a thread that the task has started
-            host.bring_in(partial(trigger_beside, event, value, activity, stamp))
+            host.bring_in(partial(trigger_from_task, event, value, activity, stamp))
         return None
 
     return send

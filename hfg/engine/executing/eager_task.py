@@ -18,7 +18,7 @@ from typing import Any
 
 from hfg.engine.model.core import PENDING
 
-__all__ = ["Carrier"]
+__all__ = ["EagerTask"]
 
 Done = Callable[[Any, BaseException | None], None]
 
@@ -34,19 +34,19 @@ else:
         return previous
 
 
-class _Bed(asyncio.Future[None]):
+class _Sleep(asyncio.Future[None]):
     """What a dormant task sleeps on; cancelling the task cancels what it lends its identity to."""
 
-    carrier: Carrier | None = None
+    eager_task: EagerTask | None = None
 
     def cancel(self, msg: Any = None) -> bool:
         """Hand the cancellation on; without a coroutine under way the task itself ends."""
-        if self.carrier is not None and self.carrier.take_cancellation(msg):
+        if self.eager_task is not None and self.eager_task.take_cancellation(msg):
             return True
         return super().cancel(msg)
 
 
-class Carrier:
+class EagerTask:
     """The dormant task of one async node.
 
     Attributes:
@@ -87,8 +87,8 @@ class Carrier:
         self.task: asyncio.Task[None] = loop.create_task(self._sleep(), name=name, context=self._context)
 
     async def _sleep(self) -> None:
-        bed = _Bed(loop=self._loop)
-        bed.carrier = self
+        bed = _Sleep(loop=self._loop)
+        bed.eager_task = self
         await bed
 
     @property

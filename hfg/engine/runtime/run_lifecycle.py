@@ -14,14 +14,14 @@ from typing import Any
 
 import anyio
 
+from hfg.engine.executing.asking import speaker
 from hfg.engine.executing.code import answer
 from hfg.engine.executing.groups import ThreadGroup
-from hfg.engine.executing.lost import LostTasks
-from hfg.engine.executing.speaking import speaker
+from hfg.engine.executing.orphan_tasks import OrphanTasks
 from hfg.engine.executing.watchdog import Watch, watchdog
-from hfg.engine.model import Core, Flight
-from hfg.engine.model.worker import STARTING, Worker
-from hfg.engine.rules import lifecycle, wiring
+from hfg.engine.model import ConcurrentFiring, Core
+from hfg.engine.model.running_node import STARTING, RunningNode
+from hfg.engine.rules import node_lifecycle, wiring
 from hfg.engine.rules.activity import gate_changed
 from hfg.engine.rules.agenda import consider, note_full
 from hfg.engine.rules.modifiers import discard
@@ -33,12 +33,12 @@ from hfg.errors import HfgError, NodeError, TeardownError
 from hfg.ports.edges import BufferEdge, EventEdge
 from hfg.trace import RunEnded, RunStarted
 
-__all__ = ["Lifetime"]
+__all__ = ["RunLifecycle"]
 
 _LEAVING_S = 0.1  # how long a teardown that was cancelled may still take before the next one begins
 
 
-class Lifetime:
+class RunLifecycle:
     """Begins and ends the run of one engine.
 
     Attributes:
@@ -50,11 +50,11 @@ class Lifetime:
         self._last = last  # what is waited for when everything else is over
         self._leave_by = float("inf")
         self.leaving: set[asyncio.Task[None]] = set()
-        self._was_set_up: dict[Worker, None] = {}
+        self._was_set_up: dict[RunningNode, None] = {}
         self._disposables: dict[Any, Callable[[], None]] = {}  # by edge: operators and observables before it
         self._watch: Watch | None = None
         self._asking = partial(speaker, engine.core)
-        self._lost: LostTasks | None = None
+        self._lost: OrphanTasks | None = None
         self._of_tasks: list[NodeError] = []  # with what they failed, or that they did not end
         # Around what the teardown waits for now. Made here, for the first of a process takes a while: not in a hurry.
         self._patience = anyio.CancelScope()
@@ -68,7 +68,7 @@ class Lifetime:
         """Set up all nodes; whether all went well. Else the run is over."""
         engine = self._engine
         engine.begin()
-        self._lost = LostTasks.notice(engine.loop, self._asking)
+        self._lost = OrphanTasks.notice(engine.loop, self._asking)
         self._watch = watchdog.watch(engine.core, engine.settings.block_warning_s, virtual=engine.virtual)
         return await self._set_up_all(engine.core)
 
@@ -79,8 +79,8 @@ class Lifetime:
         if engine.settings.until_s is not None:
             engine.loop.call_at(engine.loop.time() + engine.settings.until_s, self._until)
         engine.moving_since = engine.now()
-        if core.seldom is not None:
-            core.seldom(RunStarted(engine.moving_since))
+        if core.trace_changes is not None:
+            core.trace_changes(RunStarted(engine.moving_since))
         core.started = True
         self._discard_initial(core)
         self._connect_operators(core)
@@ -121,10 +121,10 @@ class Lifetime:
         return True
 
     def _discard_initial(self, core: Core) -> None:
-        lifecycle.discard_initial(
+        node_lifecycle.discard_initial(
             edge for edge in core.edges if isinstance(edge, BufferEdge | EventEdge) and edge.initial
         )
-        lifecycle.end_tasks(core.workers)
+        node_lifecycle.end_tasks(core.workers)
 
     def _connect_operators(self, core: Core) -> None:
         """P9: before anything is triggered; what they give out by themselves is the first of all."""
@@ -139,17 +139,17 @@ class Lifetime:
             worker.allow(STARTING)
             consider(worker)
 
-    def carry(self, worker: Worker) -> None:
+    def carry(self, worker: RunningNode) -> None:
         """Give an async node its dormant task."""
         if worker.may_wait():
-            worker.execution.run_in(self._engine.code.carrier(worker))
+            worker.execution.run_in(self._engine.code.eager_task(worker))
 
-    async def _set_up_one(self, worker: Worker) -> None:
+    async def _set_up_one(self, worker: RunningNode) -> None:
         engine = self._engine
         waiter: asyncio.Future[HfgError | None] = engine.loop.create_future()
         self._was_set_up[worker] = None
         try:
-            engine.context.run(lifecycle.set_up, worker, partial(answer, waiter))
+            engine.context.run(node_lifecycle.set_up, worker, partial(answer, waiter))
         except KeyboardInterrupt:
             raise
         except BaseException as problem:
@@ -163,7 +163,7 @@ class Lifetime:
         """Put operators on an edge (P9)."""
         self._disposables[edge] = rx.pipe_edge(edge, operators, self._engine)
 
-    def came(self, worker: Worker) -> None:
+    def came(self, worker: RunningNode) -> None:
         """A node was set up while the run was under way (R4)."""
         self._was_set_up[worker] = None
 
@@ -256,8 +256,8 @@ class Lifetime:
         if problems and error is None:
             error, outcome = TeardownError(problems), "failed"
         engine.ended_how = (outcome, error)
-        if core.seldom is not None:
-            core.seldom(RunEnded(engine.now(), outcome))
+        if core.trace_changes is not None:
+            core.trace_changes(RunEnded(engine.now(), outcome))
         await self._last()
 
     def _let_go(self) -> None:
@@ -266,8 +266,8 @@ class Lifetime:
         for worker in engine.core.workers:
             engine_ports.release_ports(worker)
             worker.cancel_timers()
-        for carrier in self._carriers():
-            carrier.drop()
+        for eager_task in self._carriers():
+            eager_task.drop()
         for group in engine.groups.values():
             if isinstance(group, ThreadGroup):
                 group.stop()
@@ -278,23 +278,25 @@ class Lifetime:
 
     def _carriers(self) -> list[Any]:
         engine = self._engine
-        carriers = [worker.execution.carrier for worker in engine.core.workers if worker.execution.carrier is not None]
+        eager_tasks = [
+            worker.execution.eager_task for worker in engine.core.workers if worker.execution.eager_task is not None
+        ]
         for worker in engine.core.workers:
-            if worker.flights is not None:
-                carriers += worker.flights.carriers()
-        return carriers + list(engine.code.given_up)
+            if worker.concurrent is not None:
+                eager_tasks += worker.concurrent.eager_tasks()
+        return eager_tasks + list(engine.code.given_up)
 
     async def _end_carriers(self) -> None:
         """What still resists is cancelled once more and has one limit for all of it together; then it is dropped."""
-        carriers = self._carriers()
-        if not carriers:
+        eager_tasks = self._carriers()
+        if not eager_tasks:
             return
-        for carrier in carriers:
-            carrier.cancel()
-        await self._until_back(lambda: any(carrier.waiting for carrier in carriers))
-        for carrier in carriers:
-            carrier.drop()
-        await asyncio.wait({carrier.task for carrier in carriers})
+        for eager_task in eager_tasks:
+            eager_task.cancel()
+        await self._until_back(lambda: any(eager_task.waiting for eager_task in eager_tasks))
+        for eager_task in eager_tasks:
+            eager_task.drop()
+        await asyncio.wait({eager_task.task for eager_task in eager_tasks})
 
     @contextmanager
     def _within_limit(self) -> Iterator[None]:
@@ -340,42 +342,46 @@ class Lifetime:
                 code.came_back.clear()
                 await code.came_back.wait()
 
-    async def _cancel_code(self) -> dict[Worker, NodeError]:
+    async def _cancel_code(self) -> dict[RunningNode, NodeError]:
         """Cancel what still waits; threads get their time to come back. Gives back who did not."""
         code = self._engine.code
         busy = [worker for worker in self._engine.core.workers if worker.execution.in_flight]
         for worker in busy:
             worker.give_up_firing()
-            if worker.execution.carrier is not None:
-                worker.execution.carrier.cancel()
-        flights = [flight for worker in self._engine.core.workers for flight in worker.flights or ()]
-        for flight in flights:
-            flight.in_time()
-            if flight.carrier is not None:
-                flight.carrier.cancel()
+            if worker.execution.eager_task is not None:
+                worker.execution.eager_task.cancel()
+        concurrent = [firing for worker in self._engine.core.workers for firing in worker.concurrent or ()]
+        for firing in concurrent:
+            firing.in_time()
+            if firing.eager_task is not None:
+                firing.eager_task.cancel()
         for task in code.aside:
             task.cancel()
         tasks = self._engine.tasks
         tasks.cancel_all()
         begun = time.monotonic()
-        if busy or flights or tasks.under_way:
+        if busy or concurrent or tasks.under_way:
             await self._until_back(
                 lambda: (
-                    bool(tasks.under_way) or any(worker.execution.in_flight for worker in busy) or _any_works(flights)
+                    bool(tasks.under_way)
+                    or any(worker.execution.in_flight for worker in busy)
+                    or _any_works(concurrent)
                 )
             )
         seconds = time.monotonic() - begun
         self._of_tasks = tasks.leave_behind(seconds)
-        late = [flight for flight in flights if flight.working]
+        late = [firing for firing in concurrent if firing.working]
         return self._leave_behind([worker for worker in busy if worker.execution.in_flight], late, seconds)
 
-    def _leave_behind(self, busy: list[Worker], late: list[Flight], seconds: float) -> dict[Worker, NodeError]:
+    def _leave_behind(
+        self, busy: list[RunningNode], late: list[ConcurrentFiring], seconds: float
+    ) -> dict[RunningNode, NodeError]:
         """Wait no more for what does not come back; others of its thread group have their teardown in a new thread."""
         code = self._engine.code
-        stuck: dict[Worker, str] = {}
-        for flight in late:
-            code.interrupt_beside(flight)
-            stuck.setdefault(flight.worker, f"firing {flight.number}")
+        stuck: dict[RunningNode, str] = {}
+        for firing in late:
+            code.interrupt_concurrent(firing)
+            stuck.setdefault(firing.worker, f"firing {firing.number}")
         for worker in busy:
             region = worker.region
             amid = region.abandon() if region is not None and region.running else worker
@@ -383,7 +389,7 @@ class Lifetime:
             stuck[amid] = _doing(amid)
         return {worker: NodeError(worker.path, doing, _did_not_end(worker, seconds)) for worker, doing in stuck.items()}
 
-    async def _tear_down_one(self, worker: Worker) -> NodeError | None:
+    async def _tear_down_one(self, worker: RunningNode) -> NodeError | None:
         engine = self._engine
         if worker.node is None or not worker.lifecycle.is_up:
             return None
@@ -391,7 +397,7 @@ class Lifetime:
             return None
         waiter: asyncio.Future[NodeError | None] = engine.loop.create_future()
         try:
-            engine.context.run(lifecycle.tear_down, worker, partial(answer, waiter))
+            engine.context.run(node_lifecycle.tear_down, worker, partial(answer, waiter))
         except KeyboardInterrupt:  # meant for this hook, which blocks; the others have their turn
             self.hurry()
             return NodeError(worker.path, "teardown()", "it was interrupted")
@@ -424,17 +430,17 @@ class Lifetime:
                     thread.join(0.001)
 
 
-def _any_works(flights: Sequence[Flight]) -> bool:
-    return any(flight.working for flight in flights)
+def _any_works(concurrent: Sequence[ConcurrentFiring]) -> bool:
+    return any(firing.working for firing in concurrent)
 
 
-def _doing(worker: Worker) -> str:
+def _doing(worker: RunningNode) -> str:
     if worker.call_edge is not None:
         return f"slot {worker.call_edge.port_name}, call {worker.counts.calls}"
     return f"firing {worker.counts.firings}"
 
 
-def _did_not_end(worker: Worker, seconds: float) -> str:
+def _did_not_end(worker: RunningNode, seconds: float) -> str:
     if worker.group.threaded:
         return f"its thread did not come back within {seconds:.1f} s of the end and was left behind"
     return f"it was cancelled and did not end within {seconds:.1f} s"

@@ -10,12 +10,12 @@ import inspect
 from hfg.base.logs import Log, Logger
 from hfg.engine.executing.code import whose_code
 from hfg.engine.executing.groups import current_job
-from hfg.engine.model import Core, Worker
+from hfg.engine.model import Core, RunningNode
 
-__all__ = ["log_of_speaker", "speaker"]
+__all__ = ["log_of_running_code", "speaker"]
 
 
-def log_of_speaker(core: Core) -> Logger:
+def log_of_running_code(core: Core) -> Logger:
     """Give the log of the node whose code calls this; that of all nodes, if it is nobody's."""
     worker = speaker(core)
     if worker is None or worker.node is None:
@@ -24,7 +24,7 @@ def log_of_speaker(core: Core) -> Logger:
     return log
 
 
-def speaker(core: Core) -> Worker | None:
+def speaker(core: Core) -> RunningNode | None:
     """Give the node of a run whose code calls this, if any."""
     worker = whose_code()
     if worker is not None:
@@ -32,8 +32,8 @@ def speaker(core: Core) -> Worker | None:
     job = current_job()
     if job is not None:
         worker = job.worker
-    elif core.host.on_loop():
-        worker = core.current or core.speaker
+    elif core.runtime.on_loop():
+        worker = core.current or core.running_node
     region = None if worker is None else worker.region
     if region is None or not region.running:
         return worker

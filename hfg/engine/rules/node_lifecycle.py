@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any
 
-from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, DISABLED, ENDED, REMOVED, TORN_DOWN, Worker
+from hfg.engine.model.running_node import BACKOFF, BETWEEN_FIRINGS, DISABLED, ENDED, REMOVED, TORN_DOWN, RunningNode
 from hfg.engine.rules import doing, wiring
 from hfg.engine.rules.agenda import consider, unblock
 from hfg.engine.rules.modifiers import derive_scopes, discard
 from hfg.engine.rules.releasing import release
-from hfg.engine.rules.sending import send_end, telling_behind
-from hfg.engine.rules.sources import judge_sources
+from hfg.engine.rules.sending import deferring_events, send_end
+from hfg.engine.rules.sources import find_dead_sources
 from hfg.errors import NodeError
 from hfg.ports.edges import BufferEdge, Edge, EventEdge
 from hfg.trace import FiringEnded, NodeEnabled
@@ -43,7 +43,9 @@ def nothing() -> None:
     """What follows when nobody waits for it."""
 
 
-def when_idle(worker: Worker, action: Callable[[Worker, Callable[[], None]], None], then: Callable[[], None]) -> None:
+def when_idle(
+    worker: RunningNode, action: Callable[[RunningNode, Callable[[], None]], None], then: Callable[[], None]
+) -> None:
     """Do it when the node's firing or call under way is over, and let none begin meanwhile (F9, F10)."""
 
     def begin() -> None:
@@ -51,16 +53,16 @@ def when_idle(worker: Worker, action: Callable[[Worker, Callable[[], None]], Non
         action(worker, over)
 
     def over() -> None:
-        worker.core.upstairs.idle_again(worker)
+        worker.core.rules.idle_again(worker)
         then()
 
-    if not worker.busy and not worker.is_on_fast_path() and not worker.is_flying():
+    if not worker.busy and not worker.is_on_fast_path() and not worker.has_concurrent_code():
         begin()
         return
     worker.when_idle(begin)
 
 
-def _run_hook(worker: Worker, name: str, then: Then) -> None:
+def _run_hook(worker: RunningNode, name: str, then: Then) -> None:
     hook = worker.node._hook(name) if worker.node is not None else None
     if hook is None:
         then(None)
@@ -77,7 +79,7 @@ def _run_hook(worker: Worker, name: str, then: Then) -> None:
     worker.core.code.execute(worker, hook, (), done)
 
 
-def set_up(worker: Worker, then: Then) -> None:
+def set_up(worker: RunningNode, then: Then) -> None:
     """Give the node fresh state and run its `setup()`; `then(error)` follows."""
     if worker.node is None:
         then(None)
@@ -93,7 +95,7 @@ def set_up(worker: Worker, then: Then) -> None:
         worker.lifecycle.opened()
         then(problem)
         return
-    worker.core.upstairs.bind_ports(worker)
+    worker.core.rules.bind_ports(worker)
 
     def opened(error: NodeError | None) -> None:
         worker.lifecycle.opened()
@@ -102,13 +104,15 @@ def set_up(worker: Worker, then: Then) -> None:
     _run_hook(worker, "setup", opened)
 
 
-def tear_down(worker: Worker, then: Then) -> None:
+def tear_down(worker: RunningNode, then: Then) -> None:
     """Close the node's generator and run its `teardown()`, unless nothing was set up since the last time."""
     if worker.node is None or not worker.lifecycle.is_up:
         then(None)
         return
-    if worker.flights is not None and worker.is_flying() and not worker.core.over:
-        worker.flights.when_rested(lambda: tear_down(worker, then))  # its firings go on beside a call of `reset` (F14)
+    if worker.concurrent is not None and worker.has_concurrent_code() and not worker.core.over:
+        worker.concurrent.when_rested(
+            lambda: tear_down(worker, then)
+        )  # its firings go on beside a call of `reset` (F14)
         return
     tasks = worker.tasks
     if tasks is not None and tasks.end(lambda: tear_down(worker, then)):
@@ -131,21 +135,21 @@ def tear_down(worker: Worker, then: Then) -> None:
         worker.core.code.execute(worker, close, (), closed)
 
 
-def disable(worker: Worker) -> None:
+def disable(worker: RunningNode) -> None:
     """F10: discard what lies on its edges, and let producers neither send to it nor wait for it."""
     worker.enable_itself(False)
     if worker.blocked & DISABLED:
         return
     core = worker.core
     worker.block(DISABLED)
-    if core.seldom is not None:
-        core.seldom(NodeEnabled(core.now(), worker.path, False))
+    if core.trace_changes is not None:
+        core.trace_changes(NodeEnabled(core.now(), worker.path, False))
     end_tasks([worker])
     _settle_disabled([worker])
     derive_scopes(core)
 
 
-def disable_around(workers: Iterable[Worker]) -> None:
+def disable_around(workers: Iterable[RunningNode]) -> None:
     """A subgraph around them is disabled; their own flags stay (G2)."""
     newly = [worker for worker in workers if not worker.blocked & DISABLED]
     for worker in newly:
@@ -154,7 +158,7 @@ def disable_around(workers: Iterable[Worker]) -> None:
     _settle_disabled(newly)
 
 
-def end_tasks(workers: Iterable[Worker]) -> None:
+def end_tasks(workers: Iterable[RunningNode]) -> None:
     """F10: what the code of disabled nodes has started beside their firings has no end by itself, so it is cancelled.
 
     It lasts longer than the `setup()` of nodes that are disabled from the start, or reset while they are.
@@ -164,32 +168,34 @@ def end_tasks(workers: Iterable[Worker]) -> None:
             worker.tasks.cancel()
 
 
-def enable_around(owner: Worker) -> None:
+def enable_around(owner: RunningNode) -> None:
     """The subgraphs around the worker of one are enabled; it has nothing to set up."""
     owner.allow(DISABLED)
     wiring.refresh(owner)
 
 
-def _settle_disabled(workers: Sequence[Worker]) -> None:
+def _settle_disabled(workers: Sequence[RunningNode]) -> None:
     """Rewire the neighbours of nodes that were disabled, then empty their edges."""
     if not workers:
         return
     untaken = {edge for worker in workers for edges in worker.wired_out for edge in edges if edge.untaken}
     for worker in workers:  # first: activity that is given back may trigger, but not over edges that are dead now
         wiring.refresh(worker)
-    with telling_behind(workers[0].core):
+    with deferring_events(workers[0].core):
         for worker in workers:
             _empty(worker, untaken)
         for worker in workers:
-            if worker.flights is not None:
-                worker.core.upstairs.land(worker)  # what is over goes to nobody, so it need not wait for its turn (F14)
+            if worker.concurrent is not None:
+                worker.core.rules.complete_firings(
+                    worker
+                )  # what is over goes to nobody, so it need not wait for its turn (F14)
         for worker in workers:  # what consumers have taken is on edges that are dead, and holds no END (F5)
-            if worker.pending_end and worker.busy in AMID_NOTHING:
+            if worker.pending_end and worker.busy in BETWEEN_FIRINGS:
                 send_end(worker)
-    judge_sources(workers[0].core)
+    find_dead_sources(workers[0].core)
 
 
-def _empty(worker: Worker, untaken: Collection[Edge]) -> None:
+def _empty(worker: RunningNode, untaken: Collection[Edge]) -> None:
     """Discard what lies on the edges of a disabled node; what lay there untaken holds its producers no more."""
     incoming = [one for one in worker.edges_in() if not (one.port_name == "enable" and one.target_kind == "slot")]
     outgoing = [edge for edges in worker.wired_out for edge in edges]
@@ -212,7 +218,7 @@ def discard_initial(edges: Iterable[Any]) -> None:
             discard(edge, "disabled")
 
 
-def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> None:
+def enable(worker: RunningNode, then: Callable[[], None], *, fresh: bool = False) -> None:
     """F10: the node starts afresh, unless it is `fresh` already; A(v) is kept.
 
     In the back-off of a restart that sets it up, when it is over.
@@ -229,11 +235,11 @@ def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> 
             return
         worker.allow(DISABLED | ENDED)
         _not_ended(worker)
-        if itself and core.seldom is not None:  # else the subgraph around it was, and that is told
-            core.seldom(NodeEnabled(core.now(), worker.path, True))
+        if itself and core.trace_changes is not None:  # else the subgraph around it was, and that is told
+            core.trace_changes(NodeEnabled(core.now(), worker.path, True))
         wiring.refresh(worker)
         consider(worker)
-        judge_sources(core)
+        find_dead_sources(core)
         doing.afresh(worker)
         then()
 
@@ -243,9 +249,9 @@ def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> 
         _afresh(worker, up)
 
 
-def _afresh(worker: Worker, then: Callable[[], None]) -> None:
+def _afresh(worker: RunningNode, then: Callable[[], None]) -> None:
     """Teardown of what is set up, then setup; a failure ends the run. A restart under way does it in its time (X1)."""
-    host = worker.core.host
+    host = worker.core.runtime
 
     def down(error: NodeError | None) -> None:
         if worker.core.over:  # its tasks came to their end with the run: nothing is set up any more
@@ -267,22 +273,22 @@ def _afresh(worker: Worker, then: Callable[[], None]) -> None:
         tear_down(worker, down)
 
 
-def _not_ended(worker: Worker) -> None:
+def _not_ended(worker: RunningNode) -> None:
     """It starts afresh; a firing that was to end it behind others whose turn has not come is over with that (F14)."""
-    flights, core = worker.flights, worker.core
-    if flights is not None and flights.ending is not None and core.trace is not None:
-        core.trace(FiringEnded(core.now(), worker.path, flights.end_number, "abandoned"))
+    concurrent, core = worker.concurrent, worker.core
+    if concurrent is not None and concurrent.ending is not None and core.trace is not None:
+        core.trace(FiringEnded(core.now(), worker.path, concurrent.end_number, "abandoned"))
     worker.start_over()
 
 
-def reset(worker: Worker, then: Callable[[], None]) -> None:
+def reset(worker: RunningNode, then: Callable[[], None]) -> None:
     """The slot `reset`: teardown, setup, not ended; tokens and A(v) stay (A9)."""
 
     def up() -> None:
         _not_ended(worker)
         unblock(worker, ENDED)
         wiring.refresh(worker)
-        judge_sources(worker.core)
+        find_dead_sources(worker.core)
         end_tasks((worker,))
         doing.afresh(worker)
         then()
@@ -290,21 +296,21 @@ def reset(worker: Worker, then: Callable[[], None]) -> None:
     _afresh(worker, up)
 
 
-def restart(worker: Worker, backoff_s: float) -> None:
+def restart(worker: RunningNode, backoff_s: float) -> None:
     """X1: teardown, a pause, setup; a node that is disabled by then is set up when it is enabled.
 
     The caller has blocked it with `BACKOFF`.
     """
     core = worker.core
 
-    def down(worker: Worker, then: Callable[[], None]) -> None:
+    def down(worker: RunningNode, then: Callable[[], None]) -> None:
         tear_down(worker, lambda _error: then())
 
     def rested() -> None:
         worker.lifecycle.end_rest()
         when_idle(worker, up, nothing)
 
-    def up(worker: Worker, then: Callable[[], None]) -> None:
+    def up(worker: RunningNode, then: Callable[[], None]) -> None:
         if worker.blocked & (DISABLED | REMOVED):
             over(None, then)
         else:
@@ -312,7 +318,7 @@ def restart(worker: Worker, backoff_s: float) -> None:
 
     def over(error: NodeError | None, then: Callable[[], None]) -> None:
         if error is not None:
-            core.host.finish("failed", error)
+            core.runtime.finish("failed", error)
         elif not worker.blocked & TORN_DOWN:
             worker.allow(BACKOFF)  # before those that wait have their turn: they may enable or reset it
             doing.afresh(worker)

@@ -1,8 +1,8 @@
 """Firings of one node that are under way at once (rule F14), and the attempts at a firing that may be repeated (X1).
 
-A worker has one firing or call that is *beginning* at a time, as ever; where its node allows several firings, what goes
-on is a `Flight`, and `Flights` keeps them in the order in which they began. Both exist only where they are asked for.
-Plain state; the rules are in `rules.concurrency` and `rules.retries`.
+A node has at most one firing or call that is *beginning*. Where it allows several firings, those that go on are each a
+`ConcurrentFiring`, and `ConcurrentFirings` keeps them in the order in which they began. Both exist only where they are
+asked for. Plain state; the rules are in `rules.concurrency` and `rules.retries`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeAlias
 from hfg.engine.model.contracts import NodeT, Timer
 from hfg.errors import EngineInternalError, NodeError
 
-__all__ = ["Attempts", "Entry", "Flight", "Flights"]
+__all__ = ["Attempts", "ConcurrentFiring", "ConcurrentFirings", "Entry"]
 
 Entry: TypeAlias = "tuple[Any, int | None, float | None]"  # what is written to an output: value, modifier, stamp
 
@@ -71,7 +71,7 @@ class Attempts:
             timer.cancel()
 
 
-class Flight(Generic[NodeT]):
+class ConcurrentFiring(Generic[NodeT]):
     """One firing that is under way beside others.
 
     Attributes:
@@ -81,7 +81,7 @@ class Flight(Generic[NodeT]):
       attempts: tries at it.
       ticket: of the attempt; a late result of another one is not listened to (X2).
       working: its code waits or runs in a thread.
-      carrier, job: what does that for it.
+      eager_task, job: what does that for it.
       limit_timer: how long the attempt may take (X2).
       written: per output what leaves when its turn comes.
       outcome: how it went; "" while it is not over.
@@ -93,7 +93,7 @@ class Flight(Generic[NodeT]):
     __slots__ = (
         "answers",
         "attempts",
-        "carrier",
+        "eager_task",
         "failure",
         "job",
         "limit_timer",
@@ -116,7 +116,7 @@ class Flight(Generic[NodeT]):
         self.attempts = Attempts()
         self.ticket = 0
         self.working = False
-        self.carrier: Any = None
+        self.eager_task: Any = None
         self.job: Any = None
         self.limit_timer: Any = None
         self.written: list[Any] | None = None
@@ -130,19 +130,19 @@ class Flight(Generic[NodeT]):
         """X2: how long an attempt may take; `end()` has no limit."""
         return None if not self.attempts.made else self.worker.options.max_duration_s
 
-    def work(self, *, carrier: object = None, job: object = None) -> None:
+    def work(self, *, eager_task: object = None, job: object = None) -> None:
         """Its code goes on: it waits on the loop, or is in a thread."""
         self.working = True
-        self.carrier, self.job = carrier, job
-        self.worker.core.set_out()
+        self.eager_task, self.job = eager_task, job
+        self.worker.core.begin_async()
 
     def rest(self) -> tuple[Any, Any]:
         """Its code is over or given up; gives back carrier and job."""
-        had = self.carrier, self.job
-        self.carrier = self.job = None
+        had = self.eager_task, self.job
+        self.eager_task = self.job = None
         if self.working:
             self.working = False
-            self.worker.core.come_back()
+            self.worker.core.end_async()
             self.worker.room.tell_watchers()
         return had
 
@@ -193,7 +193,7 @@ class Flight(Generic[NodeT]):
         self.answers = answers
 
 
-class Flights(Generic[NodeT]):
+class ConcurrentFirings(Generic[NodeT]):
     """The firings of one node that are under way, in the order in which they began.
 
     Attributes:
@@ -203,7 +203,7 @@ class Flights(Generic[NodeT]):
       leaving: one of them is sending what it has.
       ending: the node is to end as soon as all others have left (F4): the stamp of that firing; else None.
       end_number, end_written: of that firing.
-      idle: carriers that no firing uses now.
+      idle: eager_tasks that no firing uses now.
     """
 
     __slots__ = (
@@ -229,8 +229,8 @@ class Flights(Generic[NodeT]):
         self.end_number = 0
         self.end_written: list[Any] | None = None
         self.idle: list[Any] = []
-        self._under_way: dict[Flight[NodeT], None] = {}
-        self._over: deque[Flight[NodeT]] = (
+        self._under_way: dict[ConcurrentFiring[NodeT], None] = {}
+        self._over: deque[ConcurrentFiring[NodeT]] = (
             deque()
         )  # in the order in which they came to that; not used where they are ordered
         self._on_rest: list[Callable[[], None]] = []
@@ -238,7 +238,7 @@ class Flights(Generic[NodeT]):
     def __len__(self) -> int:
         return len(self._under_way)
 
-    def __iter__(self) -> Iterator[Flight[NodeT]]:
+    def __iter__(self) -> Iterator[ConcurrentFiring[NodeT]]:
         return iter(list(self._under_way))
 
     @property
@@ -249,45 +249,45 @@ class Flights(Generic[NodeT]):
     @property
     def unfinished(self) -> bool:
         """Whether code of one of them goes on, or is to be tried again."""
-        return any(not flight.outcome for flight in self._under_way)
+        return any(not firing.outcome for firing in self._under_way)
 
     @property
     def working(self) -> int:
         """Of how many the code waits or runs in a thread."""
-        return sum(flight.working for flight in self._under_way)
+        return sum(firing.working for firing in self._under_way)
 
-    def begin(self, flight: Flight[NodeT]) -> None:
+    def begin(self, firing: ConcurrentFiring[NodeT]) -> None:
         """One more is under way."""
-        self._under_way[flight] = None
+        self._under_way[firing] = None
         self.most = max(self.most, len(self._under_way))
 
-    def over(self, flight: Flight[NodeT]) -> None:
+    def over(self, firing: ConcurrentFiring[NodeT]) -> None:
         """One of them has come to its end."""
         if not self.ordered:
-            self._over.append(flight)
+            self._over.append(firing)
 
-    def next_to_leave(self, *, to_nobody: bool) -> Flight[NodeT] | None:
+    def next_to_leave(self, *, to_nobody: bool) -> ConcurrentFiring[NodeT] | None:
         """Whose turn it is to send what it has, if there is one; what goes to nobody waits for no turn (F10)."""
         if to_nobody:
-            return next((flight for flight in self._under_way if flight.outcome), None)
+            return next((firing for firing in self._under_way if firing.outcome), None)
         if not self.ordered:
             return self._over[0] if self._over else None
         first = next(iter(self._under_way), None)
         return first if first is not None and first.outcome else None
 
-    def leave(self, flight: Flight[NodeT]) -> None:
+    def leave(self, firing: ConcurrentFiring[NodeT]) -> None:
         """It has sent what it had."""
-        del self._under_way[flight]
+        del self._under_way[firing]
         if not self.ordered:
-            self._over.remove(flight)
+            self._over.remove(firing)
 
     def begin_leaving(self, leaving: bool) -> None:
         """Who sends now, and by that frees its outputs, goes on with the next by itself."""
         self.leaving = leaving
 
-    def forget(self, flight: Flight[NodeT]) -> None:
+    def forget(self, firing: ConcurrentFiring[NodeT]) -> None:
         """It has nothing to send: a source has found its end."""
-        del self._under_way[flight]
+        del self._under_way[firing]
 
     def end(self, number: int, stamp: float, written: list[Any] | None = None) -> None:
         """The node ends behind those that are under way, by the firing of this number and stamp, and has written so."""
@@ -309,7 +309,7 @@ class Flights(Generic[NodeT]):
         """Call back when no code of them goes on."""
         self._on_rest.append(callback)
 
-    def let_others(self) -> None:
+    def run_idle_callbacks(self) -> None:
         """Those who wait until no code goes on have their turn."""
         if self._on_rest and not self.unfinished:
             waiting, self._on_rest = self._on_rest, []
@@ -320,19 +320,19 @@ class Flights(Generic[NodeT]):
         """A carrier that is free, or None."""
         return self.idle.pop() if self.idle else None
 
-    def give_back(self, carrier: object) -> None:
+    def give_back(self, eager_task: object) -> None:
         """No code goes on in it."""
-        self.idle.append(carrier)
+        self.idle.append(eager_task)
 
-    def carriers(self) -> list[Any]:
+    def eager_tasks(self) -> list[Any]:
         """All of them, of firings that wait too."""
-        return [*self.idle, *(flight.carrier for flight in self._under_way if flight.carrier is not None)]
+        return [*self.idle, *(firing.eager_task for firing in self._under_way if firing.eager_task is not None)]
 
-    def drop_carriers(self) -> None:
+    def drop_eager_tasks(self) -> None:
         """No code of the node as it was goes on."""
         idle, self.idle = self.idle, []
-        for carrier in idle:
-            carrier.drop()
+        for eager_task in idle:
+            eager_task.drop()
 
     def check_invariants(self, path: str) -> None:
         """Between two steps of the run certain things hold of them.
@@ -340,11 +340,11 @@ class Flights(Generic[NodeT]):
         Raises:
           EngineInternalError: one of them does not.
         """
-        over = [flight for flight in self._under_way if flight.outcome]
+        over = [firing for firing in self._under_way if firing.outcome]
         for holds, relation in (
             (len(self._under_way) <= self.limit, f"more than {self.limit} of its firings are under way (F14)"),
             (self.ordered or set(over) == set(self._over), "a firing that is over does not stand where it leaves"),
-            (not any(flight.working for flight in over), "a firing is over, but its code goes on"),
+            (not any(firing.working for firing in over), "a firing is over, but its code goes on"),
             (not self.leaving, "a firing is leaving between two steps"),
         ):
             if not holds:

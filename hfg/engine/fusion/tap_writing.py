@@ -11,12 +11,12 @@ import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
-from hfg.engine.model.looks import Look, WaveLook, look_inside
+from hfg.engine.model.tap import BatchTap, TokenTap, tap_inside
 
-__all__ = ["Outs", "Passed", "Telling", "tell_rest"]
+__all__ = ["Outs", "Passed", "TapWriter", "emit_rest"]
 
 Outs: TypeAlias = list[list[tuple[Any, int, "int | None"]]]
-Together: TypeAlias = Callable[[tuple[Any, ...]], None]
+Batch: TypeAlias = Callable[[tuple[Any, ...]], None]
 
 _Say: TypeAlias = Callable[[str], None]
 
@@ -36,15 +36,15 @@ class Passed(NamedTuple):
     number: int
     output: int
     edge: Any
-    look: WaveLook
+    look: BatchTap
 
 
-class Telling:
+class TapWriter:
     """Writes the lines by which a wave tells who looks.
 
     Attributes:
       looks: who looks at the edges that lead from member to member; by member and edge, as in `Schedule.outs`.
-      together: who is told of a wave together, in the order of their numbers in the text.
+      batch: who is told of a wave together, in the order of their numbers in the text.
       untold: what has passed before the call of each member, and nobody has been told.
     """
 
@@ -52,11 +52,11 @@ class Telling:
         self._outs = outs
         self._say = say
         self._real = real
-        self.looks: list[list[Look | None]] = [
-            [None if to is None else look_inside(edge) for edge, _, to in out] for out in outs
+        self.looks: list[list[TokenTap | None]] = [
+            [None if to is None else tap_inside(edge) for edge, _, to in out] for out in outs
         ]
-        told = [look.together for look in itertools.chain(*self.looks) if isinstance(look, WaveLook)]
-        self.together: list[Together] = list(dict.fromkeys(told))
+        told = [look.batch for look in itertools.chain(*self.looks) if isinstance(look, BatchTap)]
+        self.batch: list[Batch] = list(dict.fromkeys(told))
         self._waiting: list[Passed] = []
         self.untold: dict[int, list[Passed]] = {}
 
@@ -67,13 +67,13 @@ class Telling:
     def bind(self) -> None:
         """Who looks, and what they are told of, is found once."""
         say = self._say
-        for number in range(len(self.together)):
-            say(f"together{number} = names.together[{number}]")
+        for number in range(len(self.batch)):
+            say(f"batch{number} = names.batch[{number}]")
         for k, looks in enumerate(self.looks):
             for number, look in enumerate(looks):
                 if look is not None:
                     say(f"e{k}_{number} = names.edges[{k}][{number}]")
-                if isinstance(look, WaveLook):
+                if isinstance(look, BatchTap):
                     say(f"p{k}_{number} = names.looks[{k}][{number}].place")
                 elif look is not None:
                     say(f"look{k}_{number} = names.looks[{k}][{number}]")
@@ -81,26 +81,26 @@ class Telling:
     def passed(self, k: int, number: int, output: int) -> None:
         """A token is sent from member to member."""
         look = self.looks[k][number]
-        if isinstance(look, WaveLook):
+        if isinstance(look, BatchTap):
             if self._real and not any(one.k == k for one in self._waiting):
                 self._say(f"at{k} = monotonic() + epoch")
             self._waiting.append(Passed(k, number, output, self._outs[k][number][0], look))
         elif look is not None:
-            self.tell()
+            self.emit()
             value = f"NO_MESSAGE if v{k}_{output} is None else v{k}_{output}"
             self._say(f"look{k}_{number}(Token({value}, 0, stamp, e{k}_{number}.sent + region.waves + done + 1))")
 
-    def tell(self) -> None:
+    def emit(self) -> None:
         """Who is not told yet is told now."""
         if not self._waiting:
             return
         self._say("nth = region.waves + done + 1")
         if not self._real:
             self._say("at = now()")
-        for who, together in enumerate(self.together):
-            told = [self._entries(one) for one in self._waiting if one.look.together == together]
+        for who, batch in enumerate(self.batch):
+            told = [self._entries(one) for one in self._waiting if one.look.batch == batch]
             if told:
-                self._say(f"together{who}(({', '.join(told)}))")
+                self._say(f"batch{who}(({', '.join(told)}))")
         self._waiting.clear()
 
     def _entries(self, one: Passed) -> str:
@@ -120,8 +120,8 @@ class Telling:
         self._waiting = waiting
 
 
-def tell_rest(untold: Sequence[Passed], found: dict[str, Any], now: Callable[[], float]) -> None:
+def emit_rest(untold: Sequence[Passed], found: dict[str, Any], now: Callable[[], float]) -> None:
     """The wave has come to a side exit: tell what its locals hold. The counts of the edges are settled up to it."""
     for k, _, output, edge, look in untold:
         when = found[f"at{k}"] if f"at{k}" in found else now()
-        look.together((look.place, found[f"v{k}_{output}"], found["stamp"], edge.sent + 1, when))
+        look.batch((look.place, found[f"v{k}_{output}"], found["stamp"], edge.sent + 1, when))

@@ -9,7 +9,7 @@ from typing import Any
 import anyio
 import pytest
 
-from hfg.engine.executing.carrier import Carrier
+from hfg.engine.executing.eager_task import EagerTask
 from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.model.core import PENDING
 
@@ -17,7 +17,7 @@ variable: contextvars.ContextVar[str] = contextvars.ContextVar("variable", defau
 
 
 def carried(code: Any, *more: Any) -> list[Any]:
-    """Run coroutine functions one after the other in one carrier, from a callback as the engine does.
+    """Run coroutine functions one after the other in one eager_task, from a callback as the engine does.
 
     Gives back what became of each.
     """
@@ -25,7 +25,7 @@ def carried(code: Any, *more: Any) -> list[Any]:
 
     async def main() -> None:
         loop = asyncio.get_running_loop()
-        carrier = Carrier(loop, "test", contextvars.copy_context())
+        eager_task = EagerTask(loop, "test", contextvars.copy_context())
         for one in (code, *more):
             over = loop.create_future()
 
@@ -34,7 +34,7 @@ def carried(code: Any, *more: Any) -> list[Any]:
 
             def begin(one: Any = one, done: Any = done) -> None:
                 try:
-                    result = carrier.start(one(), done)
+                    result = eager_task.start(one(), done)
                 except Exception as error:
                     done(None, error)
                     return
@@ -43,9 +43,9 @@ def carried(code: Any, *more: Any) -> list[Any]:
 
             loop.call_soon(begin)
             outcomes.append(await over)
-        carrier.cancel()
-        await asyncio.wait([carrier.task], timeout=1)
-        assert carrier.task.done()
+        eager_task.cancel()
+        await asyncio.wait([eager_task.task], timeout=1)
+        assert eager_task.task.done()
 
     with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
         runner.run(main())
@@ -144,19 +144,19 @@ def test_a_cancelled_firing_does_not_cancel_the_next() -> None:
 
     async def main() -> None:
         loop = asyncio.get_running_loop()
-        carrier = Carrier(loop, "test", contextvars.copy_context())
+        eager_task = EagerTask(loop, "test", contextvars.copy_context())
         for cancel in (True, False):
             over: asyncio.Future[Any] = loop.create_future()
 
             def done(result: Any, error: BaseException | None, over: asyncio.Future[Any] = over) -> None:
                 over.set_result(error or result)
 
-            assert carrier.start(suspending(), done) is PENDING
+            assert eager_task.start(suspending(), done) is PENDING
             if cancel:
-                carrier.cancel()
+                eager_task.cancel()
             outcomes.append(await over)
-        assert carrier.task.cancelling() == 0
-        carrier.cancel()
+        assert eager_task.task.cancelling() == 0
+        eager_task.cancel()
 
     with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
         runner.run(main())

@@ -19,8 +19,8 @@ import numpy as np
 
 from hfg.base.token import Token
 from hfg.encoding import TokenCodec, data
-from hfg.engine.model.worker import ENDED, Worker
-from hfg.engine.rules.agenda import consider, let_follow
+from hfg.engine.model.running_node import ENDED, RunningNode
+from hfg.engine.rules.agenda import consider, queue_next_in_wave
 from hfg.engine.rules.ending import drain_left
 from hfg.engine.rules.sending import enqueue, put
 from hfg.engine.runtime.borders import Inlet, Outlet
@@ -33,7 +33,7 @@ from hfg.ports import Port
 from hfg.ports.edges import AnyEdge, EventEdge
 from hfg.transport import Position
 
-__all__ = ["Keeper", "KeptEdge", "KeptOutbox", "Leaving", "Snapshot", "read"]
+__all__ = ["Checkpointer", "KeptEdge", "KeptOutbox", "Leaving", "Snapshot", "read"]
 
 _BYTES_PER_S: Final = 10_000_000  # how much is kept at most: large state is kept less often
 _VERSION: Final = 1
@@ -138,7 +138,7 @@ class _Asked(msgspec.Struct):
     held: dict[str, int]
 
 
-class Keeper:
+class Checkpointer:
     """Keeps what one part does."""
 
     def __init__(
@@ -325,7 +325,7 @@ class Keeper:
         packed = [(self._pack(token.value, hint, what), token.activity, token.stamp) for token in tokens]
         return KeptEdge(sent, edge.ended, isinstance(edge, EventEdge) and edge.end_sent, packed)
 
-    def _states(self, worker: Worker) -> dict[str, Packed]:
+    def _states(self, worker: RunningNode) -> dict[str, Packed]:
         node: Node = worker.node
         self._need_state(worker.path, node)
         found = {}
@@ -336,7 +336,7 @@ class Keeper:
 
     # --- going on ---------------------------------------------------------------------------------------------------
 
-    def _recall(self, worker: Worker) -> None:
+    def _recall(self, worker: RunningNode) -> None:
         """Before a node is set up: restore its stored state."""
         assert self.kept is not None
         node = worker.node
@@ -372,11 +372,11 @@ class Keeper:
                 edges[label].clear()
                 edges[label].go_on(found.sent, ended=found.ended)
         for worker in core.workers:
-            core.upstairs.rewire(worker)
-        since = len(core.followers)
+            core.rules.rewire(worker)
+        since = len(core.next_in_wave)
         for label, found in kept.edges.items():
             self._lay_again(edges[label], found)
-        let_follow(core, since)
+        queue_next_in_wave(core, since)
         for worker in core.workers:
             consider(worker)
         self._say_ends(kept)
@@ -401,9 +401,9 @@ class Keeper:
                 enqueue(edge, value, activity, stamp)
             else:
                 put(edge, value, activity, stamp)
-                source: Worker = edge.source
-                if source.outputs.missing and source.placed:
-                    source.unplace()
+                source: RunningNode = edge.source
+                if source.outputs.missing and source.fireable:
+                    source.drop_firing()
         if isinstance(edge, EventEdge) and found.end_sent:
             edge.say_end()
 
@@ -412,9 +412,9 @@ class Keeper:
         for path, is_pending in kept.ended.items():
             worker = core.by_path[path]
             if not is_pending:
-                core.upstairs.node_ended(worker)
+                core.rules.node_ended(worker)
             elif not worker.outputs.missing:
-                core.upstairs.send_end(worker)
+                core.rules.send_end(worker)
 
     def check(self) -> None:
         """See whether what was kept is of this part.

@@ -11,23 +11,23 @@ from typing import Any
 
 from hfg.base.token import END
 from hfg.engine.model import Core
-from hfg.engine.model.worker import (
+from hfg.engine.model.running_node import (
     BACKOFF,
+    DEAD_SOURCE,
     DISABLED,
     ENDED,
     FULL,
-    FUTILE,
     RATE,
     RECORDED,
     RESTING,
     UNREADY,
     UNWIRED,
-    Worker,
+    RunningNode,
 )
 from hfg.engine.rules.ending import drain_left
 from hfg.engine.rules.modifiers import derive_scopes, receive
 from hfg.engine.rules.sending import enqueue, put_outputs
-from hfg.engine.rules.sources import judge_sources
+from hfg.engine.rules.sources import find_dead_sources
 from hfg.errors import Stalled
 from hfg.ports.edges import AnyEdge, EventEdge
 
@@ -37,7 +37,7 @@ __all__ = [
     "end_events",
     "give_up",
     "node_ended",
-    "only_futile_in_flight",
+    "only_dead_sources_in_flight",
     "only_waiting_for_room",
     "stall",
     "stalled",
@@ -93,26 +93,26 @@ def end_events(core: Core) -> bool:
     return bool(edges or feeds)
 
 
-def node_ended(worker: Worker) -> None:
+def node_ended(worker: RunningNode) -> None:
     """A node is over: its operators complete (P9), and sources may feed nobody any more (R5)."""
     for edge in worker.event_edges():
         complete_edge(edge)
     if any(edge.source.is_source for edge in worker.in_edges):
-        judge_sources(worker.core)
+        find_dead_sources(worker.core)
 
 
 def give_up(core: Core) -> bool:
-    """R5: futile sources before which something lies count as ended from now on: it is drained (F12).
+    """R5: dead sources before which something lies count as ended from now on: it is drained (F12).
 
     So whoever has sent it may go on; whether there are any.
     """
     given_up = [
         source
         for source in core.sources
-        if source in core.futile and not source.blocked & ENDED and any(edge.untaken for edge in _joined(source))
+        if source in core.dead_sources and not source.blocked & ENDED and any(edge.untaken for edge in _joined(source))
     ]
     for source in given_up:
-        source.end(given_up=True)
+        source.end(is_dead_source=True)
     for source in given_up:
         drain_left([edge for edge in _joined(source) if edge.untaken])  # what it works on is its firing's affair
         assert source.ending is not None
@@ -122,17 +122,19 @@ def give_up(core: Core) -> bool:
     return bool(given_up)
 
 
-def _joined(worker: Worker) -> list[Any]:
+def _joined(worker: RunningNode) -> list[Any]:
     return [edge for edge in worker.in_edges if edge.joins()]
 
 
-def only_futile_in_flight(core: Core, *, threads_too: bool) -> bool:
+def only_dead_sources_in_flight(core: Core, *, threads_too: bool) -> bool:
     """R5: a source that feeds only ended nodes does not keep the run alive.
 
     Even while it waits or works in a thread.
     """
     busy = [worker for worker in core.workers if worker.codes_at_work()]
-    return bool(busy) and all(worker in core.futile and (threads_too or not worker.group.threaded) for worker in busy)
+    return bool(busy) and all(
+        worker in core.dead_sources and (threads_too or not worker.group.threaded) for worker in busy
+    )
 
 
 def only_waiting_for_room(core: Core) -> bool:
@@ -149,7 +151,7 @@ def stall(core: Core) -> Stalled | None:
 def stuck(core: Core) -> list[str]:
     """R5: who waits for what, now that nothing moves any more; none if all is well."""
     core.settle_barriers()
-    lies: dict[Worker, list[AnyEdge]] = {}
+    lies: dict[RunningNode, list[AnyEdge]] = {}
     for edge in core.edges:
         if _lies_for_good(edge):
             lies.setdefault(edge.target, []).append(edge)
@@ -157,7 +159,7 @@ def stuck(core: Core) -> list[str]:
     reasons.extend(
         f'source "{source.path}" has not ended and {waits_for(source)}'
         for source in core.sources
-        if source not in core.futile and not source.blocked & (ENDED | DISABLED | RESTING)
+        if source not in core.dead_sources and not source.blocked & (ENDED | DISABLED | RESTING)
     )
     return reasons
 
@@ -172,7 +174,7 @@ def stalled(reasons: Sequence[str]) -> Stalled:
     )
 
 
-def unread(core: Core, read: Collection[Worker]) -> list[Worker]:
+def unread(core: Core, read: Collection[RunningNode]) -> list[RunningNode]:
     """Give the graph outputs that nobody reads and that hold somebody back who could move (P10).
 
     Args:
@@ -194,7 +196,7 @@ def unread(core: Core, read: Collection[Worker]) -> list[Worker]:
 
 def _lies_for_good(edge: AnyEdge) -> bool:
     """Whether what lies on it is still to be taken, now that nothing moves any more."""
-    target: Worker = edge.target
+    target: RunningNode = edge.target
     return (
         edge.untaken > 0
         and target not in target.core.outlets  # what lies there lies before who is to take it, too, in another part
@@ -205,7 +207,7 @@ def _lies_for_good(edge: AnyEdge) -> bool:
     )
 
 
-def _why_stuck(target: Worker, edges: list[AnyEdge]) -> str:
+def _why_stuck(target: RunningNode, edges: list[AnyEdge]) -> str:
     lies = ", ".join(f'"{edge.label}"' for edge in edges[:3]) + (" ..." if len(edges) > 3 else "")
     who = "" if target.is_boundary_output else f'"{target.path}" '
     return f"{who}{waits_for(target)}, while tokens lie on {lies}"
@@ -219,11 +221,11 @@ _WAITS = (
     (RECORDED, "waits for its recorder"),
     (BACKOFF, "is being restarted"),
     (RESTING, "rests, for its gate is closed"),
-    (FUTILE, "has nobody left to work for"),
+    (DEAD_SOURCE, "has nobody left to work for"),
 )
 
 
-def waits_for(worker: Worker) -> str:
+def waits_for(worker: RunningNode) -> str:
     """Say what keeps a node from moving, as the end of a sentence about it."""
     if worker.is_boundary_output:
         return f'graph output "{worker.port_name}" is not read (`async for value in run.read(...)` would)'
@@ -237,12 +239,12 @@ def waits_for(worker: Worker) -> str:
         names = [edge.port_name for edge in worker.live_inputs if not edge.untaken]
         return "waits for " + ", ".join(f'"{name}"' for name in names)
     if worker.outputs.missing:
-        edges = [edge.label for edge in worker.all_out_edges() if getattr(edge, "held", False)]
+        edges = [edge.label for edge in worker.all_out_edges() if getattr(edge, "unprocessed", False)]
         return "waits until its token is processed on " + ", ".join(f'"{label}"' for label in edges[:3])
     return "is held back by its rate" if blocked & RATE else "cannot move"
 
 
-def _lacks(worker: Worker) -> str:
+def _lacks(worker: RunningNode) -> str:
     fed = {edge.port_name for edge in worker.live_inputs}
     names = [name for name in worker.mandatory_ports if name not in fed]
     if names:

@@ -23,11 +23,11 @@ import anyio
 from hfg.base.frames import is_ours, users_part
 from hfg.base.logs import node_log
 from hfg.engine.executing.virtual import VirtualTimeLoop
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.running_node import RunningNode
 
-__all__ = ["LostTasks"]
+__all__ = ["OrphanTasks"]
 
-Asking = Callable[[], Worker | None]
+Asking = Callable[[], RunningNode | None]
 
 _STANDARD: Final = sysconfig.get_path("stdlib")
 _INSTALLED: Final = tuple({sysconfig.get_path("purelib"), sysconfig.get_path("platlib"), site.getusersitepackages()})
@@ -38,16 +38,16 @@ _OF_THE_LOOP: Final = asyncio.Handle._run.__code__  # noqa: SLF001
 
 _PATH: Final = "_hfg_path"
 
-_of_loop: weakref.WeakKeyDictionary[asyncio.AbstractEventLoop, LostTasks] = weakref.WeakKeyDictionary()
+_of_loop: weakref.WeakKeyDictionary[asyncio.AbstractEventLoop, OrphanTasks] = weakref.WeakKeyDictionary()
 
 
-class LostTasks:
+class OrphanTasks:
     """Those of the runs on one event loop; `notice` when a run begins, `forget` when it is over."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
         self._asking: list[Asking] = []
-        self._tasks: weakref.WeakKeyDictionary[asyncio.Task[Any], Worker] = weakref.WeakKeyDictionary()
+        self._tasks: weakref.WeakKeyDictionary[asyncio.Task[Any], RunningNode] = weakref.WeakKeyDictionary()
         self._factory_before: Any = loop.get_task_factory()
         self._handler_before: Any = loop.get_exception_handler()
         self._factory: Any = self._make
@@ -56,7 +56,7 @@ class LostTasks:
         loop.set_exception_handler(self._handler)
 
     @classmethod
-    def notice(cls, loop: asyncio.AbstractEventLoop, asking: Asking) -> LostTasks:
+    def notice(cls, loop: asyncio.AbstractEventLoop, asking: Asking) -> OrphanTasks:
         """A run begins; `asking` tells the node of it whose code runs now, if any."""
         found = _of_loop.get(loop)
         if found is None:
@@ -64,7 +64,7 @@ class LostTasks:
         found._asking.append(asking)
         return found
 
-    def forget(self, asking: Asking, is_of_run: Callable[[Worker], bool]) -> None:
+    def forget(self, asking: Asking, is_of_run: Callable[[RunningNode], bool]) -> None:
         """The run is over, and its code has ended: what that has left behind is told."""
         for task, worker in list(self._tasks.items()):
             if not is_of_run(worker):
@@ -109,7 +109,7 @@ class LostTasks:
             loop.default_exception_handler(context)
 
 
-def _is_asked_for_by(worker: Worker, frame: FrameType | None) -> bool:
+def _is_asked_for_by(worker: RunningNode, frame: FrameType | None) -> bool:
     """Whether it is the node's own code that asks for a task, and not a library that looks after its tasks itself."""
     while frame is not None:
         file = frame.f_code.co_filename
