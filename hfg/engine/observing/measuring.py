@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from time import monotonic
 from typing import Any
 
+from msgspec import structs
+
 from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.running_node import (
@@ -29,6 +31,7 @@ from hfg.engine.model.running_node import (
     RunningNode,
 )
 from hfg.engine.observing.meters import Distribution, Meter
+from hfg.engine.observing.report import edge_report, node_report
 from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
 from hfg.engine.runtime.callbacks import Edited
 from hfg.engine.runtime.engine import Engine
@@ -227,18 +230,9 @@ class Measuring:
         busy = meter.busy_s
         pieces = worker.counts.done
         node = NodeStatistics(
+            **structs.asdict(node_report(worker)),
             group=worker.group.name,
-            firings=worker.counts.firings,
-            processed=worker.counts.processed,
-            silent=worker.counts.silent,
-            calls=worker.counts.calls,
-            failed=worker.counts.failed,
-            retries=worker.counts.retries,
-            restarts=worker.counts.restarts,
             under_way=worker.firings_under_way(),
-            most_under_way=worker.most_under_way(),
-            active=worker.active,
-            ended=bool(worker.blocked & ENDED),
             rate_hz=_per_second(pieces - meter.before, over),
             busy=_times(meter.spent),
             busy_share=_share(busy, machine),
@@ -253,15 +247,10 @@ class Measuring:
 
     def _edge(self, edge: Any, over: float) -> EdgeStatistics:
         return EdgeStatistics(
-            sent=edge.sent,
+            **structs.asdict(edge_report(edge)),
             rate_hz=_per_second(edge.sent - self._before.get(edge, 0), over),
-            dropped=edge.dropped,
-            drained=edge.drained,
-            untaken=edge.untaken,
             deepest=max(edge.deepest, int(edge.sent > edge.dropped + edge.drained)),  # fast paths count from two on
             capacity=getattr(edge, "capacity", None),
-            grown=getattr(edge, "grown", 0),
-            lost=edge.lost,
         )
 
 

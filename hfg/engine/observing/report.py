@@ -10,11 +10,21 @@ from typing import Any, Protocol
 import msgspec
 
 from hfg.engine.model import Core
-from hfg.engine.model.running_node import ENDED
+from hfg.engine.model.running_node import ENDED, RunningNode
 from hfg.engine.observing.tables import seconds, table
 from hfg.graph import Graph
+from hfg.ports.edges import AnyEdge, EventEdge
 
-__all__ = ["EdgeReport", "NodeReport", "Report", "RunPage", "edge_reports", "node_reports"]
+__all__ = [
+    "EdgeReport",
+    "NodeReport",
+    "Report",
+    "RunPage",
+    "edge_report",
+    "edge_reports",
+    "node_report",
+    "node_reports",
+]
 
 
 class NodeReport(msgspec.Struct, frozen=True):
@@ -195,38 +205,43 @@ class RunPage(Protocol):
         """
 
 
+def node_report(worker: RunningNode) -> NodeReport:
+    """Return the counts of one node, which report and statistics share."""
+    counts = worker.counts
+    return NodeReport(
+        firings=counts.firings,
+        processed=counts.processed,
+        silent=counts.silent,
+        calls=counts.calls,
+        failed=counts.failed,
+        retries=counts.retries,
+        restarts=counts.restarts,
+        most_under_way=worker.most_under_way(),
+        active=worker.active,
+        ended=bool(worker.blocked & ENDED),
+    )
+
+
+def edge_report(edge: AnyEdge) -> EdgeReport:
+    """Return the counts of one edge, which report and statistics share."""
+    return EdgeReport(
+        sent=edge.sent,
+        dropped=edge.dropped,
+        drained=edge.drained,
+        untaken=edge.untaken,
+        grown=edge.grown if isinstance(edge, EventEdge) else 0,
+        lost=edge.lost,
+    )
+
+
 def node_reports(core: Core) -> dict[str, NodeReport]:
     """Count what every running node has done so far."""
     core.settle_counts()
-    return {
-        worker.path: NodeReport(
-            firings=worker.counts.firings,
-            processed=worker.counts.processed,
-            silent=worker.counts.silent,
-            calls=worker.counts.calls,
-            failed=worker.counts.failed,
-            retries=worker.counts.retries,
-            restarts=worker.counts.restarts,
-            most_under_way=worker.most_under_way(),
-            active=worker.active,
-            ended=bool(worker.blocked & ENDED),
-        )
-        for worker in core.workers
-        if worker.node is not None and worker.scope is None
-    }
+    nodes = [worker for worker in core.workers if worker.node is not None and worker.scope is None]
+    return {worker.path: node_report(worker) for worker in nodes}
 
 
 def edge_reports(core: Core) -> dict[str, EdgeReport]:
     """Count what every edge has carried so far."""
     core.settle_counts()
-    return {
-        edge.label: EdgeReport(
-            sent=edge.sent,
-            dropped=edge.dropped,
-            drained=edge.drained,
-            untaken=edge.untaken,
-            grown=getattr(edge, "grown", 0),
-            lost=edge.lost,
-        )
-        for edge in core.edges
-    }
+    return {edge.label: edge_report(edge) for edge in core.edges}

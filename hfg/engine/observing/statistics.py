@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from hfg.engine.observing.report import EdgeReport, NodeReport
 from hfg.engine.observing.tables import seconds, table
 
 __all__ = ["EdgeStatistics", "GroupStatistics", "NodeStatistics", "Statistics", "Times"]
@@ -30,22 +31,12 @@ class Times(msgspec.Struct, frozen=True):
     last_s: tuple[float, ...]
 
 
-class NodeStatistics(msgspec.Struct, frozen=True):
-    """One node.
+class NodeStatistics(NodeReport, frozen=True, kw_only=True):
+    """One node: its counts, as in the report, and times.
 
     Attributes:
       group: where it runs.
-      firings: firings, silent ones and the one that ended it included.
-      processed: firings in which the function ran.
-      silent: firings without the function (F4).
-      calls: slot calls.
-      failed: failed firings and calls.
-      retries: how often a firing was tried again (X1).
-      restarts: how often X1 restarted it.
       under_way: how many of its firings are under way now; with concurrency those too that wait for their turn.
-      most_under_way: how many there ever were at once (F14).
-      active: A(v).
-      ended: whether it has sent END.
       rate_hz: firings and calls a second of the run's clock, over the last one to two seconds.
       busy: how long its firings and calls took on the machine's clock, what async code waited for included.
       busy_share: of the machine's time since measuring began, how much its code kept its group busy.
@@ -61,17 +52,7 @@ class NodeStatistics(msgspec.Struct, frozen=True):
     """
 
     group: str
-    firings: int
-    processed: int
-    silent: int
-    calls: int
-    failed: int
-    retries: int
-    restarts: int
     under_way: int
-    most_under_way: int
-    active: bool
-    ended: bool
     rate_hz: float
     busy: Times
     busy_share: float
@@ -83,30 +64,18 @@ class NodeStatistics(msgspec.Struct, frozen=True):
     tasks: tuple[str, ...] = ()
 
 
-class EdgeStatistics(msgspec.Struct, frozen=True):
-    """One edge.
+class EdgeStatistics(EdgeReport, frozen=True, kw_only=True):
+    """One edge: its counts, as in the report, and rates.
 
     Attributes:
-      sent: tokens put on it, markers and dropped ones included.
       rate_hz: of those, a second of the run's clock, over the last one to two seconds.
-      dropped: discarded, for whatever reason.
-      drained: processed without a firing because the consumer has ended (F12).
-      untaken: what lies on it now.
       deepest: the most that ever lay on it.
       capacity: places of its queue; None for an edge of data, which has one, unless a buffer or a delay adds to that.
-      grown: places that F8 added.
-      lost: gone with the process of a group that died (L2).
     """
 
-    sent: int
     rate_hz: float
-    dropped: int
-    drained: int
-    untaken: int
     deepest: int
     capacity: int | None
-    grown: int
-    lost: int = 0
 
 
 class GroupStatistics(msgspec.Struct, frozen=True):

@@ -42,7 +42,9 @@ __all__ = ["Counts", "CutRun"]
 
 T = TypeVar("T")
 
-_NO_STATISTICS: Final = EdgeStatistics(0, 0.0, 0, 0, 0, 0, None, 0)
+_NO_STATISTICS: Final = EdgeStatistics(
+    sent=0, dropped=0, drained=0, untaken=0, grown=0, rate_hz=0.0, deepest=0, capacity=None
+)
 
 
 class Counts(msgspec.Struct, frozen=True):
