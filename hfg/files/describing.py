@@ -8,11 +8,8 @@ file describes is told by that file. Stands on `document`, `boxes` and `missing`
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final
-
-import msgspec
+from typing import Any
 
 from hfg.base.values import same
 from hfg.encoding import encode
@@ -32,11 +29,11 @@ from hfg.files.document import (
 from hfg.files.findings import Findings
 from hfg.files.missing import MissingNode
 from hfg.graph.editing.data import edge_as_data
+from hfg.graph.editing.insides import differ_in_values_only, nodes_inside
 from hfg.graph.editing.type_texts import text_of_type
 from hfg.graph.graph import Graph
 from hfg.graph.structure.edge import Edge, is_feed
 from hfg.graph.structure.level import Level, inside, level_of
-from hfg.graph.structure.operators import NamedOperator
 from hfg.graph.structure.options import GroupSpec
 from hfg.graph.structure.refusals import raise_refusals
 from hfg.graph.structure.subgraph import Box, is_box, is_unnamed
@@ -46,8 +43,6 @@ from hfg.ports.kinds import choices_of, type_of_choices
 from hfg.ports.specs import REQUIRED
 
 __all__ = ["describe"]
-
-_OF_BUILT: Final = ("enabled", "group")  # what may be said about a node that a type has built
 
 
 def describe(graph: Graph, beside: Path | None = None, *, same_program: bool = False) -> Document:
@@ -286,20 +281,14 @@ class _Telling:
         """Tell what is otherwise inside than the type builds it; None if more is than can be said so."""
         fresh = self.built_anew(node)
         made = None if fresh is None else inside(fresh)
-        if made is None or fresh is None or _shape(within) != _shape(made):
+        if made is None or fresh is None or not differ_in_values_only(within, made):
             return None
         found: dict[str, InsideDocument] = {}
         notes = level_of(fresh.place.graph).whole.notes
-        pairs = zip(_within(within), _within(made), strict=True)
+        others = nodes_inside(made).values()
         built = {gate.target for level in made.whole.root.walk() for gate in level.gates}
-        for (path, one), (_, other) in pairs:
-            if msgspec.structs.replace(other._options, **{name: getattr(one._options, name) for name in _OF_BUILT}) != (
-                one._options
-            ):
-                return None
+        for (path, one), other in zip(nodes_inside(within).items(), others, strict=True):
             told = InsideDocument(parameters=self.parameters(one, other))
-            if any(not one._type.parameters[name].is_port for name in told.parameters):
-                return None  # the size of a vector
             if one._options.enabled != other._options.enabled:
                 told.enabled = one._options.enabled
             if one._options.group != other._options.group:
@@ -361,29 +350,6 @@ def _end(end: Any, level: Level) -> str:
     return f"{end.node.place.name}.{end.name}"
 
 
-def _within(level: Level) -> list[tuple[str, Node]]:
-    """All nodes inside of a subgraph, by path from there."""
-    prefix = f"{level.path}/"
-    return [(node.place.path.removeprefix(prefix), node) for one in level.walk() for node in one.nodes.values()]
-
-
-def _shape(level: Level) -> list[Any]:
-    """What is inside, as data that can be compared, but for what is told of a node that is there."""
-    return [_shape_of_level(one, f"{level.path}/") for one in level.walk()]
-
-
-def _shape_of_level(level: Level, prefix: str) -> tuple[Any, ...]:
-    def near(path: str) -> str:
-        return path.replace(prefix, "", 1) if path.startswith(prefix) else path
-
-    return (
-        [(name, node._type.reference or _kind(node)) for name, node in level.nodes.items()],
-        [(_ends(edge, level), _said(edge)) for edge in level.edges],
-        [(near(gate.target.place.path), near(gate.by.place.path), gate.idle_rate_hz) for gate in level.gates],
-        [(name, [_parameter_name(port) for port in ports]) for name, ports in level.promotions.by_name.items()],
-    )
-
-
 def _choices(spec: ParameterSpec) -> tuple[list[Any] | None, list[str]]:
     """What may be chosen, and how it is called; nothing where the type says it."""
     known = choices_of(spec.type)
@@ -397,32 +363,3 @@ def _choices(spec: ParameterSpec) -> tuple[list[Any] | None, list[str]]:
 def _parameter_name(port: Any) -> str:
     """Name a parameter as its subgraph promotes it."""
     return f"{port.node.place.name}.{port.name}"
-
-
-def _kind(node: Node) -> object:
-    """What stands for a type that has no name: a subgraph that is built has another each time."""
-    return node._type.qualname if is_box(node) else node._type
-
-
-def _ends(edge: Edge, level: Level) -> tuple[str, str]:
-    return ("observable" if is_feed(edge.source) else _end(edge.source, level)), _end(edge.target, level)
-
-
-def _said(edge: Edge) -> tuple[Any, ...]:
-    """What is said about an edge; operators without a name are made anew each time, and are taken for the same."""
-    options = edge.options
-    through = [one if isinstance(one, NamedOperator) else None for one in options.through]
-    others = [getattr(options, name) for name in options.__struct_fields__ if name not in ("through", "initial")]
-    return (*others, through, len(options.initial), *map(_Same, options.initial))
-
-
-class _Same:
-    """A value that is compared as files compare values."""
-
-    def __init__(self, value: object) -> None:
-        self.value = value
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and same(self.value, other.value)
-
-    __hash__: Callable[..., int] = None  # type: ignore[assignment]

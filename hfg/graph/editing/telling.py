@@ -10,13 +10,12 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, cast
 
-import msgspec
-
 from hfg.base.values import same
 from hfg.encoding import encode
 from hfg.errors import EncodingError, GraphError, HfgError
 from hfg.graph.editing import commands as c
 from hfg.graph.editing.data import edge_as_data
+from hfg.graph.editing.insides import differ_in_values_only, nodes_inside
 from hfg.graph.editing.performing import perform
 from hfg.graph.editing.type_texts import text_of_type
 from hfg.graph.structure.edge import Edge, is_feed
@@ -75,7 +74,7 @@ class _Telling:
             self.say(c.AddOutput(name, _text(out.type, f'output "{name}" of the graph')))
         self._tell_level(self.root, self.made)
         self._tell_gates()
-        for node in (None, *_walk(self.root).values()):
+        for node in (None, *nodes_inside(self.root).values()):
             for name, value in self.root.whole.notes.get(node, {}).items():
                 self.say(c.Note("" if node is None else node.place.path, name, value))
 
@@ -90,7 +89,7 @@ class _Telling:
                 inner, inner_made = inside(node), inside(made.nodes[name])
                 if inner is None or inner_made is None:
                     continue
-                if same(_shape(inner), _shape(inner_made)) and _tells_apart(inner, inner_made):
+                if differ_in_values_only(inner, inner_made):
                     self._tell_values(inner, inner_made)
                     continue
                 self._clear(inner_made)
@@ -127,9 +126,8 @@ class _Telling:
 
     def _tell_values(self, inner: Level, made: Level) -> None:
         """What is inside of a subgraph is what its type builds; what was set or switched there is told beside."""
-        there = _walk(made)
-        for path, one in _walk(inner).items():
-            other = there[path]
+        for one, other in zip(nodes_inside(inner).values(), nodes_inside(made).values(), strict=True):
+            path = one.place.path
             for name, value in one._parameters.items():
                 spec = one._type.parameters[name]
                 if spec.is_port and spec.is_given and not same(other._parameters[name], value):
@@ -199,11 +197,6 @@ def _data(encoded: Callable[[Any], Any], value: object) -> object:
         return value
 
 
-def _given(node: Node) -> dict[str, Any]:
-    """What users gave its parameters."""
-    return {name: value for name, value in node._parameters.items() if node._type.parameters[name].is_given}
-
-
 def _connected(edge: Edge) -> c.Connect:
     if is_feed(edge.source):
         raise GraphError(
@@ -215,39 +208,3 @@ def _connected(edge: Edge) -> c.Connect:
     except GraphError as error:
         raise GraphError(f'edge "{edge.label}": {error}') from error
     return c.Connect(edge.source.path, edge.target.path, **said)
-
-
-def _tells_apart(inner: Level, made: Level) -> bool:
-    """Whether all that differs inside are values, switches and groups, which commands say of nodes that are there."""
-    others = _walk(made)
-    for path, one in _walk(inner).items():
-        other = others[path]
-        here, there = one._options, other._options
-        if msgspec.structs.replace(there, enabled=here.enabled, group=here.group) != here:
-            return False
-        ports, before = one._type.parameters, _given(other)
-        if any(not same(before[name], value) for name, value in _given(one).items() if not ports[name].is_port):
-            return False
-    return True
-
-
-# --- what is the same ---
-
-
-def _walk(level: Level) -> dict[str, Node]:
-    """All nodes at a level and inside it, by path."""
-    return {node.place.path: node for one in level.walk() for node in one.nodes.values()}
-
-
-def _shape(level: Level) -> list[Any]:
-    """All that is inside, as data that can be compared, but for what commands say of a node that is there."""
-    return [_shape_of_level(one) for one in level.walk()]
-
-
-def _shape_of_level(level: Level) -> tuple[Any, ...]:
-    return (
-        [(name, node._type.reference or node._type) for name, node in level.nodes.items()],
-        [(edge.label, edge.options) for edge in level.edges],
-        [(gate.target.place.path, gate.by.place.path, gate.idle_rate_hz) for gate in level.gates],
-        {name: [port.path for port in ports] for name, ports in level.promotions.by_name.items()},
-    )
