@@ -42,6 +42,6 @@ CHUNK_BYTES: Final = Bound("HFG_MOST_CHUNK_BYTES", 256 * 2**20, "bytes of one ch
 FILE_BYTES: Final = Bound("HFG_MOST_FILE_BYTES", 2**30, "bytes of a file, line or array that is read whole")
 GRAPH_FILE_BYTES: Final = Bound("HFG_MOST_GRAPH_FILE_BYTES", 32 * 2**20, "bytes of a graph file or .apex file")
 JSON_VALUES: Final = Bound("HFG_MOST_JSON_VALUES", 10_000_000, "values in a JSON text, including keys")
-PICTURE_PIXELS: Final = Bound("HFG_MOST_PICTURE_PIXELS", 2**27, "pixels of one picture or of a frame of a video")
+PICTURE_PIXELS: Final = Bound("HFG_MOST_PICTURE_PIXELS", 2**27, "pixels of one image or video frame")
 
 BOUNDS: Final = (CHUNK_BYTES, FILE_BYTES, GRAPH_FILE_BYTES, JSON_VALUES, PICTURE_PIXELS)

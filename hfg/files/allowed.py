@@ -13,6 +13,7 @@ import functools
 import importlib.util
 import sys
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Final
@@ -144,8 +145,9 @@ class Allowed:
     def _folder_of(self, top: str) -> Path | None:
         """The folder in which a module lies that Python does not find by itself."""
         for folder in dict.fromkeys((self._folder, self.project, self.project / "src")):
-            if (folder / f"{top}.py").is_file() or (folder / top).is_dir():
-                return folder
+            with suppress(OSError):  # no file has a name that is longer than the system allows
+                if (folder / f"{top}.py").is_file() or (folder / top).is_dir():
+                    return folder
         return None
 
 

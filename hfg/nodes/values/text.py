@@ -290,7 +290,8 @@ def search_text(text: str, *, pattern: Annotated[str, Predicate(is_a_pattern)] =
       pattern: of Python's `re`; one with nested repetitions may take very long.
 
     Returns:
-      found: what the pattern describes. groups: what each of its groups describes; "" of a group that took no part.
+      found: the text that matches the pattern.
+      groups: the text of each group; "" for a group that took no part.
       names: the same by name, of groups that have names.
     """
     match = re.search(pattern, text)

@@ -158,7 +158,8 @@ def extremum(values: Vector, *, which: Literal["maximum", "minimum"] = "maximum"
       which: "maximum" or "minimum".
 
     Returns:
-      extremum: the number. index: its place, from 0.
+      extremum: the number.
+      index: its place, from 0.
 
     Raises:
       OverflowError: a whole number is too large for a float.
