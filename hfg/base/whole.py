@@ -71,6 +71,9 @@ def need_writable(path: Path) -> None:
 
 
 def _target(path: Path) -> Path:
+    if path.is_symlink() and hasattr(os, "geteuid") and path.lstat().st_uid not in (0, os.geteuid()):
+        # in a folder that others may write to, anyone can lead us to a file of ours
+        raise PermissionError(errno.EPERM, "a symbolic link of another user is in its place; remove it", str(path))
     target = path.resolve() if path.is_symlink() else path
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
