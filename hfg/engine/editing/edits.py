@@ -2,7 +2,7 @@
 
 One edit after the other: checked on the drawn graph, new nodes are set up while the others go on, then the touched
 nodes are held as they come to rest, the plan is changed at one moment, and all go on. What fails on the way leaves
-graph and run as they were. Stands on `plan_diff`, `applying` and `lifecycle`.
+graph and run as they were. Stands on `plan_diff`, `applying` and `node_lifecycle`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Holding a run still: pause, one step of one node, one wave, breakpoints (rule R3).
 
 While the run is paused nothing is taken from the run queues; what is under way goes on to its end, timers ring and
-tokens stay where they are. Stands on `places` and `quiet`.
+tokens stay where they are. Stands on `places` and `quiescence`.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 While the code of one of them waits until a queue has room, none is held: they may be the ones that make it. Those
 inside of a subgraph that iterates are held behind it, for its firing is over when they have come to rest (G4).
-Stands on `lifecycle`.
+Stands on `node_lifecycle`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Parameters that are set from outside: between firings, and never without effect (rule P8).
 
-Stands on `lifecycle`.
+Stands on `node_lifecycle`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Runs the code of nodes where it belongs: on the loop, as a coroutine, or in the thread of a group (rules R1, R6, X2).
 
-What a node's code gives back is handed to whoever asked, at once or later, always on the loop. Stands on `carrier`,
+What a node's code gives back is handed to whoever asked, at once or later, always on the loop. Stands on `eager_task`,
 `groups` and `virtual`.
 """
 

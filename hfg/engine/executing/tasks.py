@@ -1,7 +1,7 @@
 """Runs the tasks that the code of nodes starts by `start_soon`: children of their nodes (rules X1, X3, R5).
 
 Each is carried as the code of an async node is, so that at the end of the run it can be left behind and outlives
-nothing. Stands on `carrier` and `code`.
+nothing. Stands on `eager_task` and `code`.
 """
 
 from __future__ import annotations

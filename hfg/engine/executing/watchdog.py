@@ -2,7 +2,7 @@
 
 A thread of the process looks from time to time which worker's code is on which loop; if it is the same firing for
 longer than the run's limit, it says so, also when the code never returns. The hot path only notes whose code runs.
-Stands on `core`.
+Stands on `nodetypes`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Whose code runs, where `asyncio` cannot tell: in which of several firings, or in which task of a node.
 
-Context variables, so that they hold in whatever that code starts by itself. Stands on `worker`.
+Context variables, so that they hold in whatever that code starts by itself. Stands on `running_node`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What holds of a whole run between two of its steps: of nodes, edges and regions, and between them.
 
-Asked in debug mode and by tests. Stands on `worker` and `core`.
+Asked in debug mode and by tests. Stands on `running_node` and `core`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Which of the nodes of a group that can move is next: first in first out, priority, deadline, fair share, chance (R2).
 
 A policy is a run queue: three methods over workers. It may look at everything a worker and its options say, and never
-changes them. Stands on `worker`; knows neither loops nor threads.
+changes them. Stands on `running_node`; knows neither loops nor threads.
 """
 
 from __future__ import annotations

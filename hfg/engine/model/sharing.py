@@ -2,7 +2,7 @@
 
 While a value lies on an edge, or a node that has taken it is at work, the arrays in it are read-only, and what else can
 be looked at cheaply is compared with what it was like when it was sent. Who is still at work is read from the edges and
-workers themselves, so that whatever becomes of a token, nothing stays locked. Stands on `worker`; decides nothing.
+nodes themselves, so that whatever becomes of a token, nothing stays locked. Stands on `running_node`; decides nothing.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What measures the code of running nodes: it wraps the code, and the rest of the engine does not know.
 
 Of a node that is very fast only some firings between two looks are measured and stand for the others, so that measuring
-costs next to nothing; all are counted. Stands on `worker`.
+costs next to nothing; all are counted. Stands on `running_node`.
 """
 
 from __future__ import annotations

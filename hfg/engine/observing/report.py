@@ -1,4 +1,4 @@
-"""What a run has done, in numbers: frozen structs for people, tests and `--json`. Stands on `core`."""
+"""What a run has done, in numbers: frozen structs for people, tests and `--json`. Stands on `running_node`."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Who may move: places in the agenda, run queues, and what keeps a node from firing (rules F1, F8, F9, F11).
 
-Plain functions over the run's state; they queue workers and never run a node's code. Stands on `worker`, `core`.
+Plain functions over the run's state; they queue workers and never run a node's code. Stands on `running_node`, `edges`.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 (rules F10, G2).
 
-Stands on `lifecycle` and `activity`.
+Stands on `node_lifecycle` and `activity`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """From a flattened graph to running nodes and edges (rule G1): everything a token needs is found here, once.
 
-Stands on `graph.flat`, `worker` and `wiring`.
+Stands on `graph.flat`, `running_node` and `wiring`.
 """
 
 from __future__ import annotations

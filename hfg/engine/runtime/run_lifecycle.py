@@ -1,6 +1,6 @@
 """The beginning and the end of a run: nodes are set up in order and torn down in reverse order (rules A10, R5, X3).
 
-Stands on `lifecycle`, `engine` and `code`.
+Stands on `node_lifecycle`, `engine` and `code`.
 """
 
 from __future__ import annotations
