@@ -22,6 +22,7 @@ from benchmarks.goals import Goal, cases_of, verdicts
 from benchmarks.measure import Record, here, machine, measure, write
 
 SUITES = (
+    "bench_alive",
     "bench_edits",
     "bench_files",
     "bench_kinds",

@@ -106,6 +106,7 @@ class Allowed:
     sending: bool = False  # nodes send in every way there is, from plain code and async, which pauses or not
     strange: bool = False  # values that raise when they are looked at; most errors are skipped
     plain: bool = False  # mostly functions close to each other: the shapes of which regions are fused
+    alive: bool = False  # activity everywhere: nodes that fire, are called and trigger, gates, active edges
 
 
 SYNCHRONOUS = Allowed(
@@ -169,6 +170,7 @@ _JOINS = ["add", "either", "with_default"]
 _PLAIN = [*_JOINS * 3, "double", "some", "some", "some", "sink", "parted", "Sends", "mood", "calm"]
 _STRANGE = [what for what in STRANGE if what not in ("huge number", "deep list")]  # which only take long
 
+_ALIVE = ["Lives"] * 8 + ["LivesTwice"] * 4 + ["Heeds"] * 4 + ["Attentive", "Tally", "Stateful", "Passing"]
 _PLAIN_WHERE_CODE_WAITS = ["restless", "calling"]
 _PLAIN_WHERE_CODE_FAILS = ["picky", "picky", "gives_up"]
 _PLAIN_WHERE_ACTIVITY_MOVES = ["handing"]
@@ -203,7 +205,7 @@ _WAITING = {
     *_PAUSING,
     "Works",
 }
-_ANY_SLOTS = {"tell", "begin", "more", "hear", "ping", "gave"}
+_ANY_SLOTS = {"nudge", "tell", "begin", "more", "hear", "ping", "gave"}
 _BOUNDED_SLOTS = {"say", "hand_on", "hear", "utter"}
 _TURNED = {"Scaled": "factor", "Pulse": "most", "Script": "count", "Hums": "tone"}
 """Parameters that edges set; a source with such an edge waits for it."""
@@ -264,7 +266,7 @@ class _Making:
         sources = ["script", "Script"] + (["ascript"] if allowed.waiting else [])
         if allowed.sending:
             sources += _SPEAKING_SOURCES + (_SPEAKING_SOURCES_LATER if allowed.waiting else [])
-        sources += ["Pairs"] * 2 * allowed.pairs
+        sources += ["Pairs"] * 2 * allowed.pairs + ["Ticks"] * 3 * allowed.alive
         count = choose.number(2, allowed.max_nodes)
         inner, plain = self._inner_kinds(), self._plain_kinds()
         for number in range(count):
@@ -312,6 +314,7 @@ class _Making:
         kinds += _PLAIN_WHERE_CODE_FAILS if allowed.failures else []
         kinds += _PLAIN_WHERE_ACTIVITY_MOVES if allowed.activity else []
         kinds += ["odd"] * 2 if allowed.strange else []
+        kinds += _ALIVE + ["Works"] * allowed.doing if allowed.alive else []
         kinds += _PLAIN_SENDING if allowed.sending else []
         kinds += _PLAIN_SENDING_LATER if allowed.sending and allowed.waiting else []
         return kinds
@@ -330,6 +333,10 @@ class _Making:
                 if kind == "ascript":
                     given["pause_s"] = choose.one_of([0.0, 0.004, 0.01])
                 return given
+            case "Lives" | "Heeds":
+                return {"every": choose.number(1, 4)}
+            case "Ticks":
+                return {"count": choose.number(4, 14), "every": choose.number(2, 4)}
             case "Script" | "Pairs":
                 return {"count": choose.number(0, 24 if self.allowed.plain else 5)}
             case _ if kind in (*_SPEAKING, *_PAUSING):
@@ -521,7 +528,8 @@ class _Making:
         choose, allowed = self.choose, self.allowed
         slots = [(node, port) for node in self.nodes for port in self.type_of(node.name).slots]
         slots = [(node, port) for node, port in slots if port != "poke" or allowed.failing_calls]
-        for _ in range(choose.number(0, (len(self.nodes) // 4) if allowed.plain else 2 * len(self.nodes))):
+        sparse = allowed.plain and not allowed.alive
+        for _ in range(choose.number(0, (len(self.nodes) // 4) if sparse else 2 * len(self.nodes))):
             if not slots or choose.chance(12):
                 self._delicate_edge()
                 continue
@@ -536,6 +544,8 @@ class _Making:
         for node in self.nodes:
             if node.type == "Works" and allowed.activity and allowed.start and choose.chance(40):
                 self._edge(("", "event", "start"), (node.name, "slot", "activate"), active=True)
+        for _ in range(choose.number(1, 3) if allowed.alive else 0):
+            self._edge(("", "event", "start"), (choose.one_of(self.nodes).name, "slot", "activate"), active=True)
         if allowed.activity and allowed.start and slots and choose.chance(60):
             begins = [(node.name, "slot", port) for node, port in slots if port in _ANY_SLOTS]
             begins += [(node.name, "slot", "activate") for node in self.nodes if node.type not in _LEFT_ALONE]
@@ -577,7 +587,8 @@ class _Making:
         ):
             return
         options: dict[str, Any] = {}
-        active = (allowed.activity and choose.chance(self._seldom(35))) if active is None else active
+        often = 60 if allowed.alive and "slot" in (source[1], target[1]) else self._seldom(35 * (1 + allowed.alive))
+        active = (allowed.activity and choose.chance(often)) if active is None else active
         if active:
             options["active"] = True
         if source[1] == "event" and target[1] != "parameter":
@@ -632,12 +643,15 @@ class _Making:
         )
 
     def make_gates(self) -> list[GatePlan]:
-        choose = self.choose
-        if len(self.nodes) < 2 or not choose.chance(15):
+        choose, alive = self.choose, self.allowed.alive
+        if len(self.nodes) < 2 or not choose.chance(70 if alive else 15):
             return []
-        target = choose.one_of(self.nodes)
-        by = choose.one_of([node for node in self.nodes if node is not target])
-        return [GatePlan(target.name, by.name, choose.one_of([None, 100.0, 20.0]))]
+        gates: dict[str, GatePlan] = {}
+        for _ in range(choose.number(1, 4) if alive else 1):
+            target = choose.one_of(self.nodes).name
+            by = choose.one_of([node for node in self.nodes if node.name != target])
+            gates[target] = GatePlan(target, by.name, choose.one_of([None] * (1 + 7 * alive) + [100.0, 20.0]))
+        return list(gates.values())
 
     def mean_boxes(self, boxes: list[BoxPlan], gates: list[GatePlan]) -> tuple[list[BoxPlan], list[GatePlan]]:
         """Connect the automatic ports of subgraphs, limit how long they are active, gate them."""

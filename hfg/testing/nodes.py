@@ -35,11 +35,14 @@ __all__ = [
     "Failing",
     "Gate",
     "Greeter",
+    "Heeds",
     "Hums",
     "LastWord",
     "Latch",
     "Lends",
     "LendsLater",
+    "Lives",
+    "LivesTwice",
     "Merge",
     "OnlyTwice",
     "Pairs",
@@ -62,6 +65,7 @@ __all__ = [
     "TalksLater",
     "Tally",
     "Tends",
+    "Ticks",
     "Tuned",
     "Unsteady",
     "Utters",
@@ -652,6 +656,90 @@ class Attentive(hfg.Node):
         self.calls += 1
         if self.calls <= 12:
             self.said.trigger(token)
+
+
+class Ticks(hfg.Node):
+    """A source that tells every so often by an event, and is called."""
+
+    out = hfg.Output(int)
+    go = hfg.Event(int)
+    count = hfg.Parameter(8)
+    every = hfg.Parameter(3)
+    at = hfg.State(0)
+
+    def process(self) -> int | None:
+        """Return the next number; every fourth is silence."""
+        if self.at >= self.count:
+            raise hfg.EndOfStream
+        self.at += 1
+        if self.at % self.every == 0:
+            self.go.trigger(self.at)
+        return self.at if self.at % 4 else None
+
+    @hfg.slot
+    def nudge(self, value: Any) -> None:
+        """Hear it, no more."""
+
+
+class Lives(hfg.Node):
+    """Fires, tells every so often by an event, and is called: what a state of a mission does."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    go = hfg.Event(int)
+    every = hfg.Parameter(2)
+    count = hfg.State(0)
+
+    def process(self, value: int) -> int | None:
+        """Return the value; what five divides is silence."""
+        self.count += 1
+        if self.count % self.every == 0:
+            self.go.trigger(value)
+        return value if value % 5 else None
+
+    @hfg.slot
+    def nudge(self, value: Any) -> None:
+        """Hear it, no more."""
+
+
+class LivesTwice(hfg.Node):
+    """The same with two inputs and two outputs, by which it sends."""
+
+    value = hfg.Input(int)
+    other = hfg.Input(int, optional=True)
+    out = hfg.Output(int)
+    rest = hfg.Output(int)
+    go = hfg.Event(int)
+
+    def process(self, value: int, other: int | None = None) -> None:
+        """Send by one, or by both and tell."""
+        self.out.send(value)
+        if other:
+            self.rest.send(other)
+            self.go.trigger(other)
+
+    @hfg.slot
+    def nudge(self, value: Any) -> None:
+        """Hear it, no more."""
+
+
+class Heeds(hfg.Node):
+    """Lives by two slots, one of which listens only while it is active; triggers every few calls."""
+
+    go = hfg.Event(int)
+    every = hfg.Parameter(2)
+    count = hfg.State(0)
+
+    @hfg.slot
+    def nudge(self, value: Any) -> None:
+        """Count, and tell."""
+        self.count += 1
+        if self.count % (1 + self.every) == 0:
+            self.go.trigger(self.count)
+
+    @hfg.slot(while_active=True)
+    def hear(self, value: Any) -> None:
+        """Hear it, no more."""
 
 
 class AsyncRelay(hfg.Node):
