@@ -1,8 +1,7 @@
 """Descriptions of random graphs: plain data that builds the same graph each time and prints as a program.
 
-A plan is flat; boxes only group its nodes, and the relays that their borders need are made while it is built. So the
-same plan with and without boxes is the
-same graph in the sense of rule G1.
+A plan is flat; boxes only group its nodes, and the relays at their boundaries are made while it is built. So a plan
+with boxes and the same plan without boxes are the same graph in the sense of rule G1.
 """
 
 from __future__ import annotations
@@ -10,18 +9,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from importlib import import_module
 from typing import Any, Final
 
 from hfg.graph import Graph, Subgraph
 from hfg.ports import Event, Input, Output, slot
-from hfg.testing import nodes as types
 
-__all__ = ["BoxPlan", "EdgePlan", "GatePlan", "GraphPlan", "NodePlan"]
+__all__ = ["LIBRARY", "BoxPlan", "EdgePlan", "GatePlan", "GraphPlan", "NodePlan"]
+
+LIBRARY: Final = "hfg.testing.nodes"
+"""The module that has the node types of a plan, unless the plan names another one."""
 
 
 @dataclass(frozen=True)
 class NodePlan:
-    """One node: its type in `hfg.testing.nodes`, parameters, options."""
+    """One node: the name of its type in the plan's library, parameters, options."""
 
     name: str
     type: str
@@ -66,6 +68,7 @@ class GraphPlan:
     gates: tuple[GatePlan, ...] = ()
     groups: tuple[str, ...] = ()
     feeds: tuple[str, ...] = ()  # inputs of the graph, of whole numbers
+    library: str = LIBRARY
 
     def build(self) -> Graph:
         """Make the graph."""
@@ -221,6 +224,7 @@ class _Building:
     def __init__(self, plan: GraphPlan, around: Graph | None = None, border: Mapping[str, Any] | None = None) -> None:
         self.drawing = _Drawing(plan)
         self.made: dict[str, Any] = {}
+        self.library = import_module(plan.library)
         self.graph = Graph() if around is None else around
         for group in plan.groups if around is None else ():
             self.graph.group(group, threads=1)
@@ -232,7 +236,7 @@ class _Building:
     def _fill(self, box: str, graph: Graph, owner: Any) -> None:
         for one in self.drawing.inside(box):
             if isinstance(one, NodePlan):
-                node = getattr(types, one.type)(**one.parameters)
+                node = getattr(self.library, one.type)(**one.parameters)
             else:
                 node = self._box(one)()
             graph.add(node, name=one.name, **one.options)
@@ -273,12 +277,7 @@ class _Writing:
         self.drawing = _Drawing(plan)
 
     def text(self) -> str:
-        lines = ["import hfg", "from typing import Any", "from hfg.testing.nodes import *"]
-        if any(node.type == "Tuned" for node in self.plan.nodes):
-            lines += ["from pathlib import PosixPath", "from numpy import array", "from hfg import Colour, Span"]
-            lines += ["from hfg.testing.nodes import Effort"]
-        if any("through" in edge.options for edge in self.plan.edges):
-            lines.append("from hfg.testing.operators import through")
+        lines = ["import hfg", "from typing import Any", f"from {self.plan.library} import *"]
         lines.append("")
         for box in self.plan.boxes:
             lines += self._class(box)

@@ -16,33 +16,36 @@ from typing import Any, TypeVar
 from hypothesis import strategies as st
 
 from hfg.base.token import END, NO_MESSAGE, Token
-from hfg.testing.making import SYNCHRONOUS, Allowed, make_plan
+from hfg.testing.making import SYNCHRONOUS, Allowed, Making
 from hfg.testing.plans import GraphPlan
 
-__all__ = ["SYNCHRONOUS", "Allowed", "graphs", "schedules", "tokens"]
+__all__ = ["SYNCHRONOUS", "Allowed", "DrawingChooser", "graphs", "schedules", "tokens"]
 
 T = TypeVar("T")
 
 
-class _DrawingChooser:
+class DrawingChooser:
     """Chooses by drawing, so that Hypothesis can shrink the choices."""
 
     def __init__(self, draw: st.DrawFn) -> None:
         self._draw = draw
 
     def number(self, least: int, most: int) -> int:
+        """Draw a whole number."""
         return self._draw(st.integers(least, most))
 
     def one_of(self, choices: Sequence[T]) -> T:
+        """Draw one of them."""
         return choices[self._draw(st.integers(0, len(choices) - 1))]
 
     def chance(self, percent: int) -> bool:
+        """Draw True with this probability."""
         return self._draw(st.integers(0, 99)) >= 100 - percent
 
 
 @st.composite
 def _plans(draw: st.DrawFn, allowed: Allowed | None) -> GraphPlan:
-    return make_plan(_DrawingChooser(draw), allowed)
+    return Making(DrawingChooser(draw), allowed or Allowed()).plan()
 
 
 def graphs(allowed: Allowed | None = None) -> st.SearchStrategy[GraphPlan]:

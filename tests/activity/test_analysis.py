@@ -14,9 +14,9 @@ from hfg.engine.runtime import engine
 from hfg.errors import Problem, RunError
 from hfg.graph.flat import flatten, scope_end
 from hfg.testing import recorder
-from hfg.testing.making import Allowed, random_plan
 from hfg.testing.nodes import Greeter, double, script, sink
 from hfg.trace import ActivityChanged, CallEnded, CallStarted, TraceEvent
+from tests.support.making import Allowed, random_plan
 
 
 class Step(hfg.Node):

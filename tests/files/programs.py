@@ -15,8 +15,8 @@ import hfg
 from hfg.engine.observing.encoding import encode
 from hfg.files import describe, load, save, text_of
 from hfg.testing import reference_run
-from hfg.testing.making import WIDE, Allowed, random_plan
 from hfg.testing.plans import GraphPlan
+from tests.support.making import WIDE, Allowed, random_plan
 
 MOST_MOVES = 1500
 

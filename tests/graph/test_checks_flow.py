@@ -11,8 +11,8 @@ import pytest
 import hfg
 from hfg.errors import CheckFailed, Problem
 from hfg.graph import Graph, Subgraph
-from hfg.testing.making import Allowed, random_plan
 from hfg.testing.nodes import script, slow_double
+from tests.support.making import Allowed, random_plan
 
 ROOT = Path(__file__).resolve().parents[2]
 

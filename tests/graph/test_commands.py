@@ -23,10 +23,18 @@ from hfg.errors import GraphError, HfgError, UsageError
 from hfg.graph import GroupSpec
 from hfg.graph.flat import flatten
 from hfg.graph.structure.history import MOST_STEPS
-from hfg.testing.making import WIDE, Allowed, SeededChooser, random_plan
-from hfg.testing.nodes import Counter, Scaled, Tally, add, double, script, sink
+from hfg.testing.nodes import (
+    Counter,
+    Scaled,
+    Tally,
+    add,
+    double,
+    script,
+    sink,
+)
 from tests.semantics.nodes import named
 from tests.support.edits import drawn, random_edit
+from tests.support.making import WIDE, Allowed, SeededChooser, random_plan
 
 SEQUENCES = 60  # of 20 edits each; runs are edited in tests/semantics/test_edits.py
 

@@ -13,12 +13,12 @@ from hfg.engine.runtime import settings
 from hfg.graph import Graph
 from hfg.graph.structure.level import level_of
 from hfg.parts.processes import launching
-from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
 from hfg.testing.plans import GraphPlan
 from hfg.trace import NodeEnded, TokenSent, TokenTaken, TraceEvent
 from hfg_transports.memory import Faults, Network
 from tests.parts.lit import lit
 from tests.semantics.test_random_graphs import reference
+from tests.support.making import SYNCHRONOUS, Allowed, random_plan
 
 pytestmark = pytest.mark.slow
 

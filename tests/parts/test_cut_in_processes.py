@@ -12,11 +12,11 @@ import pytest
 
 import hfg
 from hfg.graph.structure.level import level_of
-from hfg.testing.making import SYNCHRONOUS, random_plan
 from hfg.testing.plans import GraphPlan
 from hfg.trace import NodeEnded, TokenSent, TokenTaken, TraceEvent
 from tests.parts.lit import lit, side_by_side
 from tests.parts.test_cut_graphs import run, sequences
+from tests.support.making import SYNCHRONOUS, random_plan
 
 pytestmark = pytest.mark.slow
 

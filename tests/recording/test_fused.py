@@ -17,8 +17,8 @@ from hfg.engine.observing.recorder import ITEM, Recorder
 from hfg.engine.runtime import settings
 from hfg.recording import record
 from hfg.testing import nodes, reference_run
-from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
 from hfg.testing.reference.structure import dissolve
+from tests.support.making import SYNCHRONOUS, Allowed, random_plan
 
 MOST_MOVES = 1500
 CHAINS = replace(SYNCHRONOUS, plain=True, failures=True, rates=False, boxes=False)

@@ -17,9 +17,9 @@ from hfg.nodes.recordings import Playback
 from hfg.recording import play_into, record
 from hfg.recording.messages import Firings
 from hfg.testing import Recorder
-from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
 from hfg.testing.nodes import Script, Tally, ascript, double, sink
 from tests.recording.conftest import build, camera, show
+from tests.support.making import SYNCHRONOUS, Allowed, random_plan
 
 
 def run(graph: hfg.Graph, file: Path | None = None) -> Recorder:

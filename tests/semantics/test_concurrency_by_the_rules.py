@@ -16,7 +16,15 @@ from annotated_types import Interval
 import hfg
 from hfg import END, NO_MESSAGE
 from hfg.testing import Recorder, replay
-from hfg.testing.nodes import Doubter, Tally, add, ascript, script, sink, slow_double
+from hfg.testing.nodes import (
+    Doubter,
+    Tally,
+    add,
+    ascript,
+    script,
+    sink,
+    slow_double,
+)
 from hfg.trace import CallEnded, CallStarted, ErrorRaised, FiringEnded, NodeEnabled
 from tests.limits import patience
 from tests.semantics.nodes import drive

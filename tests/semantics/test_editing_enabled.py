@@ -12,7 +12,17 @@ import hfg
 from hfg import commands as c
 from hfg.errors import NodeError
 from hfg.testing import Recorder, recorder, replay
-from hfg.testing.nodes import Failing, Latch, Scaled, Waiting, add, ascript, double, script, sink
+from hfg.testing.nodes import (
+    Failing,
+    Latch,
+    Scaled,
+    Waiting,
+    add,
+    ascript,
+    double,
+    script,
+    sink,
+)
 from hfg.trace import (
     CallStarted,
     EventTriggered,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from hfg.testing.making import Allowed
 from tests.support.edited import EditedRun
+from tests.support.making import Allowed
 
 pytestmark = pytest.mark.slow
 

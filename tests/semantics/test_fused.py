@@ -16,12 +16,13 @@ import hfg
 from hfg import commands as c
 from hfg.cli.show import user_traceback
 from hfg.engine.runtime import settings
-from hfg.testing import Divergence, nodes, recorder, reference_run, replay
-from hfg.testing.making import Allowed, random_plan
+from hfg.testing import Divergence, recorder, reference_run, replay
 from hfg.testing.plans import GraphPlan
 from hfg.testing.recording import Recorder
 from hfg.testing.reference.structure import dissolve
 from tests.semantics.calls import Calls, Ran, begun, by_node, note_calls, noted_run, passed_by_trace
+from tests.support import kinds as nodes
+from tests.support.making import Allowed, random_plan
 from tests.support.shrinking import shrink
 
 LEAST_SHARE = 0.25  # of all firings and calls are fused

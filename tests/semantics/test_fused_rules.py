@@ -10,9 +10,9 @@ import pytest
 
 import hfg
 from hfg.engine.runtime import settings
-from hfg.testing import nodes
 from tests.semantics.nodes import KeepTokens, run
 from tests.semantics.test_fused import fused_order
+from tests.support import kinds as nodes
 
 MANY = 40
 """Waves: enough for a node that is never plain to be left out of a region."""

@@ -15,7 +15,6 @@ from hfg.base.token import Marker
 from hfg.engine.executing.groups import Job, ThreadGroup
 from hfg.engine.runtime import settings
 from hfg.testing import ReferenceReport, reference_run
-from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
 from hfg.testing.plans import GraphPlan
 from tests.semantics import meddling
 from tests.semantics.meddling import PATIENCE_S, Gate
@@ -34,6 +33,7 @@ from tests.semantics.nodes import (
     scale,
     split,
 )
+from tests.support.making import SYNCHRONOUS, Allowed, random_plan
 
 
 @pytest.fixture(autouse=True)

@@ -15,11 +15,11 @@ from hfg import commands as c
 from hfg.errors import CheckFailed, GraphError, NodeError, RunError
 from hfg.testing import Divergence
 from hfg.testing.conformance import Replay
-from hfg.testing.making import Allowed
 from hfg.trace import FiringStarted, TraceEvent
 from tests.semantics.nodes import Keep, Send, fail_on, forward, forward_async
 from tests.support.edited import EditedRun
 from tests.support.iterated import random_iterated
+from tests.support.making import Allowed
 
 _MOST_EVENTS = 2000
 

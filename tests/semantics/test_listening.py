@@ -14,8 +14,8 @@ import hfg
 from hfg.activity import StateMachine
 from hfg.errors import DeclarationError
 from hfg.testing import recorder, reference_run, replay
-from hfg.testing.making import Allowed, random_plan
 from hfg.trace import ActivityChanged, TokenDrained, TokenSent
+from tests.support.making import Allowed, random_plan
 
 HEARD: list[tuple[str, Any]] = []
 

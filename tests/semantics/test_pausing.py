@@ -14,9 +14,9 @@ import pytest
 import hfg
 from hfg import commands
 from hfg.testing import recorder, replay
-from hfg.testing.making import Allowed, random_plan
 from hfg.trace import FiringStarted, RunPaused, RunResumed
 from tests.semantics.nodes import Both, Ear, Keep, Ringing, forward, forward_async, numbers
+from tests.support.making import Allowed, random_plan
 
 
 def live(graph: hfg.Graph, act: Callable[[Any], Awaitable[None]], **options: Any) -> hfg.Report:

@@ -10,7 +10,15 @@ import pytest
 import reactivex.operators as ops
 
 import hfg
-from hfg.testing.nodes import Greeter, Latch, Script, Tally, Waiting, add, script
+from hfg.testing.nodes import (
+    Greeter,
+    Latch,
+    Script,
+    Tally,
+    Waiting,
+    add,
+    script,
+)
 from hfg.trace import CallStarted, FiringStarted, TokenSent
 from tests.semantics.calls import note_calls
 

@@ -17,8 +17,8 @@ from hfg.engine.model.policies import EarliestDeadline, FairShare, Priority
 from hfg.errors import GraphError, RunError, UsageError
 from hfg.testing import Divergence, recorder, reference_run, replay
 from hfg.testing.invariants import broken, of_graph
-from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
 from tests.semantics.nodes import Burst, Where, forward, numbers, run
+from tests.support.making import SYNCHRONOUS, Allowed, random_plan
 
 COSTS_S = (0.001, 0.003, 0.009)
 POLICIES = ("priority", "deadline", "fair")

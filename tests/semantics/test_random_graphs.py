@@ -17,9 +17,9 @@ from hfg.engine.runtime import settings as run_settings
 from hfg.testing import Divergence, ReferenceReport, graphs, recorder, reference_run, replay, schedules
 from hfg.testing.conformance import Replay
 from hfg.testing.invariants import broken, of_graph
-from hfg.testing.making import SYNCHRONOUS, WIDE, Allowed, random_plan
 from hfg.testing.plans import GraphPlan
 from hfg.trace import TraceEvent
+from tests.support.making import SYNCHRONOUS, WIDE, Allowed, random_plan
 from tests.support.shrinking import shrink
 
 pytestmark = pytest.mark.slow

@@ -12,8 +12,9 @@ from reactivex import operators as ops
 import hfg
 from hfg import END
 from hfg.testing import recorder, replay
-from hfg.testing.nodes import Unsteady, script
+from hfg.testing.nodes import script
 from tests.semantics.nodes import Ear, Keep, drive, numbers, run, value_of
+from tests.support.kinds import Unsteady
 
 
 class Device(hfg.Node):

@@ -15,10 +15,11 @@ import hfg
 from hfg import END, NO_MESSAGE, commands
 from hfg.graph import NodeGiven
 from hfg.testing import Recorder, reference_run
-from hfg.testing.nodes import Unsteady, script
+from hfg.testing.nodes import script
 from hfg.trace import ErrorRaised, FiringEnded, FiringRetried, FiringStarted, TraceEvent
 from tests.semantics.nodes import Keep, drive, named, numbers, of_kind, run
 from tests.semantics.readings import sent
+from tests.support.kinds import Unsteady
 
 
 class Device(hfg.Node):

@@ -14,11 +14,11 @@ from hfg.engine import Glance
 from hfg.graph import commands as c
 from hfg.testing import reference_run
 from hfg.testing.conformance import Replay
-from hfg.testing.making import Allowed, random_plan
 from hfg.testing.plans import GraphPlan, NodePlan
 from hfg.trace import QueueGrown, RunEnded, TokenDropped, TraceEvent
 from tests.semantics.nodes import Clock, Ear, Keep, Ringing, add, drive, of_kind, run, traced
 from tests.semantics.test_random_graphs import check, reference
+from tests.support.making import Allowed, random_plan
 
 
 class Gate(hfg.Node):

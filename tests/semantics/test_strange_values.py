@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 import hfg
 from hfg.engine.runtime import settings
-from hfg.testing import nodes, recorder, replay
-from hfg.testing.strange import ERRORS, STRANGE, broken, gives
+from hfg.testing import recorder, replay
+from tests.support import kinds as nodes
+from tests.support.strange import ERRORS, STRANGE, broken, gives
 
 MODES = ("interpreted", "fused", "debug", "threads", "recorded", "tapped", "traced", "iterated", "several")
 

@@ -9,7 +9,18 @@ import pytest
 import hfg
 from hfg.ports import OutputPort
 from hfg.testing import Recorder, recorder, replay
-from hfg.testing.nodes import Counter, Pulse, Relay, Script, Waiting, add, ascript, double, script, sink
+from hfg.testing.nodes import (
+    Counter,
+    Pulse,
+    Relay,
+    Script,
+    Waiting,
+    add,
+    ascript,
+    double,
+    script,
+    sink,
+)
 from hfg.trace import (
     ActivityChanged,
     ActivityLost,

@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 import hfg
 from hfg import commands
 from hfg.testing import Divergence, recorder, replay
-from hfg.testing.nodes import Beats, Doubter, Tends, script
+from hfg.testing.nodes import Doubter, script
 from hfg.trace import EventTriggered, TokenSent, TraceEvent
 from tests.semantics.nodes import Ear, Keep, drive, forward, modifiers, named, numbers, of_kind, run, sent, slow_numbers
+from tests.support.kinds import Beats, Tends
 
 RUNS: list[hfg.Run] = []
 

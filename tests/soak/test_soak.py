@@ -16,8 +16,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis.stateful import run_state_machine_as_test
 
-from hfg.testing.making import WIDE, Allowed, random_plan
 from tests.support.machines import EngineAgainstOracle
+from tests.support.making import WIDE, Allowed, random_plan
 
 GRAPHS = int(os.environ.get("HFG_SOAK_GRAPHS", "20000"))
 SEED = int(os.environ.get("HFG_SOAK_SEED", "1000000"))

@@ -9,9 +9,9 @@ import pytest
 
 import hfg
 from hfg.graph import Graph
-from hfg.testing.making import SYNCHRONOUS, random_plan
 from hfg.trace import NodeEnded, TokenSent, TraceEvent
 from tests.parts.test_cut_graphs import cut_at_random, run, sequences
+from tests.support.making import SYNCHRONOUS, random_plan
 
 pytest.importorskip("zenoh", reason="processes speak over Zenoh")
 

@@ -11,11 +11,11 @@ from typing import Any
 import hfg
 from hfg.errors import GraphError, NotRunning, RunError, UsageError
 from hfg.testing.conformance import Divergence, Replay
-from hfg.testing.making import Allowed, SeededChooser, random_plan
 from hfg.testing.reference import Move
 from hfg.trace import RunEnded, TokenDropped, TraceEvent
 from tests.support.edits import drawn, random_edit
 from tests.support.iterated import random_iterated
+from tests.support.making import Allowed, SeededChooser, random_plan
 from tests.support.planned import planned, planned_afresh
 
 __all__ = ["EditedRun"]

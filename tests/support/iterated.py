@@ -12,8 +12,8 @@ from typing import Any
 from hfg.graph import Graph, Subgraph
 from hfg.nodetypes.functions import node
 from hfg.ports import Input, Output
-from hfg.testing.making import FEEDS, Allowed, SeededChooser, description, make_plan
 from hfg.testing.plans import EdgePlan, GraphPlan
+from tests.support.making import FEEDS, Allowed, SeededChooser, Wide, make_plan
 
 __all__ = ["IteratedPlan", "collections", "gather", "random_iterated"]
 
@@ -99,7 +99,7 @@ def random_iterated(seed: int, allowed: Allowed) -> IteratedPlan:
     if repeats:
         values[repeats] = tuple(choose.number(0, 6) for _ in shape)
     taken = {edge.source for edge in inner.edges}
-    ends = [(one.name, "output", port) for one in inner.nodes for port in description(one.type).outputs]
+    ends = [(one.name, "output", port) for one in inner.nodes for port in Wide.description(one.type).outputs]
     ends = [end for end in ends if end not in taken or choose.chance(30)]
     edges = [EdgePlan(end, ("", "input", f"o{number}")) for number, end in enumerate(ends[:_MOST_OUTPUTS])]
     return IteratedPlan(replace(inner, edges=(*inner.edges, *edges)), depth, len(edges), values, repeats)

@@ -19,16 +19,15 @@ import hfg
 from hfg.base.token import END
 from hfg.errors import HfgError
 from hfg.testing.conformance import Replay
-from hfg.testing.making import Allowed
 from hfg.testing.plans import GraphPlan
 from hfg.testing.recording import Recorder
 from hfg.testing.reference import ReferenceMachine, reference_run
-from hfg.testing.strategies import graphs
 from hfg.trace import TraceEvent
+from tests.support.making import Allowed, graphs
 
 __all__ = ["STIMULATED", "EngineAgainstOracle"]
 
-STIMULATED = Allowed(max_nodes=5, feeds=True, gates=False, operators=False, failing_calls=False, doing=True)
+STIMULATED = Allowed(max_nodes=5, feeds=True, gates=False, failing_calls=False, doing=True)
 """What occurs in the graphs of the machine."""
 
 MOST_MOVES = 800

@@ -9,8 +9,17 @@ import pytest
 import hfg
 from hfg.base.token import Token
 from hfg.testing import Divergence, Recorder, recorder, replay
-from hfg.testing.nodes import Doubter, Relay, Script, Tally, ascript, double, script, sink, some
-from hfg.testing.operators import through
+from hfg.testing.nodes import (
+    Doubter,
+    Relay,
+    Script,
+    Tally,
+    ascript,
+    double,
+    script,
+    sink,
+    some,
+)
 from hfg.trace import (
     ActivityChanged,
     CallStarted,
@@ -21,6 +30,7 @@ from hfg.trace import (
     TokenSent,
     TraceEvent,
 )
+from tests.support.operators import through
 
 
 def build() -> hfg.Graph:

@@ -9,7 +9,16 @@ from hypothesis import strategies as st
 import hfg
 from hfg.base.token import END, NO_MESSAGE
 from hfg.testing.diagrams import Step, check, draw, parse, run
-from hfg.testing.nodes import Counter, Failing, Greeter, Passing, Relay, Sieve, Waiting, double
+from hfg.testing.nodes import (
+    Counter,
+    Failing,
+    Greeter,
+    Passing,
+    Relay,
+    Sieve,
+    Waiting,
+    double,
+)
 
 
 def test_a_line_is_read_character_by_character() -> None:

@@ -14,11 +14,11 @@ import pytest
 
 from hfg.base.token import END
 from hfg.testing import reference_run
-from hfg.testing.making import WIDE, random_plan
-from hfg.testing.operators import WITH_TIME
 from hfg.testing.plans import EdgePlan, GraphPlan, NodePlan
 from hfg.testing.reference import ReferenceReport
 from hfg.trace import ActivityChanged, TokenDrained, TokenDropped, TokenSent
+from tests.support.making import WIDE, random_plan
+from tests.support.operators import WITH_TIME
 
 SEEDS = range(500)
 PLANS = [random_plan(seed, WIDE) for seed in SEEDS]

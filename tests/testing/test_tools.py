@@ -14,8 +14,18 @@ import hfg
 from hfg.base.token import NO_MESSAGE, Token
 from hfg.testing import Recorder, ScheduleFailure, explore, graphs, recorder, reference_run, schedules, tokens
 from hfg.testing.invariants import ALL, broken, of_graph
-from hfg.testing.making import Allowed, random_plan
-from hfg.testing.nodes import Counter, Pulse, Relay, Script, Tally, add, double, script, sink, slow_double
+from hfg.testing.nodes import (
+    Counter,
+    Pulse,
+    Relay,
+    Script,
+    Tally,
+    add,
+    double,
+    script,
+    sink,
+    slow_double,
+)
 from hfg.testing.plans import GraphPlan
 from hfg.trace import (
     ActivityChanged,
@@ -29,6 +39,7 @@ from hfg.trace import (
     TokenTaken,
     TraceEvent,
 )
+from tests.support.making import Allowed, random_plan
 
 # --- recorder
 

@@ -10,9 +10,9 @@ import pytest
 
 import hfg
 from hfg.testing import Divergence, Recorder, recorder, reference_run, replay
-from hfg.testing.making import Allowed, random_plan
 from hfg.testing.nodes import Scaled, double, script, sink
 from hfg.trace import FiringStarted
+from tests.support.making import Allowed, random_plan
 from tests.support.waves import replay_depth_first
 
 
