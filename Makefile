@@ -14,7 +14,7 @@ RESULTS := benchmarks/results
 PEERS   := .venv-peers
 
 .DEFAULT_GOAL := help
-.PHONY: help demo photographs test test-fast lint bench peers bench-peers bench-goals bench-docs bench-links docs docs-nodes docs-drawings docs-mermaid soak setup clean
+.PHONY: help demo photographs test test-fast lint bench peers bench-peers bench-goals bench-docs bench-links docs docs-nodes docs-drawings docs-mermaid web test-web soak setup clean
 
 help:
 	@echo "make demo    a robot fetches and delivers cubes; score, video and report in out/fetch_delivery, in less than 3 minutes"
@@ -28,6 +28,8 @@ help:
 	@echo "make docs-nodes   write docs/nodes from the docstrings of the library"
 	@echo "make docs-drawings   redraw the graphs in README and docs"
 	@echo "make docs-mermaid   draw the Mermaid diagrams in docs for the site; needs Chromium and npm"
+	@echo "make web     build the page of the studio into hfg/studio/static; needs Node 20 and npm"
+	@echo "make test-web   check the page of the studio alone: types and unit tests; needs Node 20 and npm"
 	@echo "make soak    run the tests that take minutes"
 	@echo "make clean   remove .venv and everything that tools have left"
 
@@ -90,6 +92,17 @@ docs-drawings: $(READY)
 
 docs-nodes: $(READY)
 	$(BIN)/python -m hfg.catalogue.page docs/nodes
+
+# The built page is committed, so that nobody needs Node to use the studio. Scripts of packages are not run.
+web/node_modules: web/package.json web/package-lock.json
+	cd web && npm ci --ignore-scripts --no-fund --no-audit
+	@touch $@
+
+web: web/node_modules
+	cd web && npm run build
+
+test-web: web/node_modules
+	cd web && npm test
 
 soak: $(READY)
 	$(BIN)/python -m pytest -m soak --timeout 3600

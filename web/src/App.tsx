@@ -1,0 +1,65 @@
+import { useEffect } from "react";
+import { Canvas } from "./canvas/Canvas";
+import { Inspector } from "./inspector/Inspector";
+import { useKeys } from "./keys/useKeys";
+import { Menu } from "./panels/Menu";
+import { Outline } from "./panels/Outline";
+import { Popovers } from "./panels/Popovers";
+import { StartPage } from "./panels/StartPage";
+import { useFailures } from "./panels/useFailures";
+import { FileBar } from "./shell/FileBar";
+import { Rail } from "./shell/Rail";
+import { StatusBar } from "./shell/StatusBar";
+import { Toasts } from "./shell/Toasts";
+import { TopBar } from "./shell/TopBar";
+import { useStudio } from "./state/studio";
+import { BottomPanel } from "./timeline/BottomPanel";
+import { applyTheme } from "./ui/colours";
+
+export function App() {
+  const theme = useStudio((s) => s.theme);
+  const side = useStudio((s) => s.side);
+  const old = useStudio((s) => s.age === 3);
+  const start = useStudio((s) => s.rev >= 0 && Object.keys(s.tables.nodes).length === 0 && s.tables.studio.file?.kind === "none");
+  useKeys();
+  useFailures();
+  useEffect(() => {
+    applyTheme(theme);
+    localStorage.setItem("hfg-theme", theme);
+  }, [theme]);
+  const classes = ["frame", !side && "noside", old && "old"].filter(Boolean).join(" ");
+  return (
+    <div className={classes}>
+      <TopBar />
+      <Rail />
+      {start ? (
+        <StartPage />
+      ) : (
+        <>
+          <div className="middle">
+            <FileBar />
+            <Canvas />
+            <Outline />
+            <Toasts />
+          </div>
+          <Inspector />
+          <BottomPanel />
+        </>
+      )}
+      <StatusBar />
+      <Menu />
+      <Popovers />
+      <Announcements />
+    </div>
+  );
+}
+
+/** Changes of activity for screen readers, at most one a second. */
+function Announcements() {
+  const text = useStudio((s) => s.announced);
+  return (
+    <div className="hidden-text" aria-live="polite">
+      {text}
+    </div>
+  );
+}

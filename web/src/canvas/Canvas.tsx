@@ -1,0 +1,123 @@
+import "@xyflow/react/dist/base.css";
+import { Background, BackgroundVariant, ReactFlow, ReactFlowProvider, ViewportPortal } from "@xyflow/react";
+import { useMemo, useRef } from "react";
+import { change, layoutKey, useStudio } from "../state/studio";
+import { enter } from "../state/actions";
+import { FarOverlay } from "./FarOverlay";
+import { MovedWires } from "./MovedWires";
+import { NodeView } from "./NodeView";
+import { Tags } from "./Tags";
+import { useCanvasEvents } from "./useCanvasEvents";
+import { useNodes } from "./useNodes";
+import { useView } from "./useView";
+import { ValueTip } from "./ValueTip";
+import { WireDrag } from "./WireDrag";
+import { Wires } from "./Wires";
+import { spotsOf } from "./wiring";
+import { Mini, Zoomer } from "./Zoomer";
+
+const NODE_TYPES = { hfg: NodeView };
+
+export function Canvas() {
+  return (
+    <ReactFlowProvider>
+      <Inner />
+    </ReactFlowProvider>
+  );
+}
+
+function Inner() {
+  const root = useRef<HTMLElement>(null);
+  const layout = useStudio((s) => s.tables.layouts[layoutKey(s)]);
+  const wiring = useStudio((s) => s.wire !== null);
+  const spots = useMemo(() => (layout ? spotsOf(layout) : new Map()), [layout]);
+  const { nodes, moved, onNodesChange, onDragStart, onDragStop } = useNodes(layout);
+  const view = useView(root, layout);
+  const events = useCanvasEvents(spots, layout);
+  const classes = [view.level, wiring && "wiring", layout?.view === "activity" && "view-activity"];
+  const rect = root.current?.getBoundingClientRect();
+  return (
+    <main id="canvas" ref={root} className={classes.filter(Boolean).join(" ")} aria-label="Graph" {...events}>
+      <ReactFlow
+        nodes={nodes}
+        edges={NO_EDGES}
+        nodeTypes={NODE_TYPES}
+        onNodesChange={onNodesChange}
+        onNodeDragStart={onDragStart}
+        onNodeDragStop={onDragStop}
+        onSelectionDragStart={(event, dragged) => onDragStart(event, dragged[0]!, dragged)}
+        onSelectionDragStop={(event, dragged) => onDragStop(event, dragged[0]!, dragged)}
+        onNodeDoubleClick={(_, node) => {
+          if (node.data.box.kind === "subgraph") enter(node.id);
+          else change({ renaming: node.id });
+        }}
+        onPaneClick={() => change({ selectedEdge: null, menu: null })}
+        onMove={view.onMove}
+        onMoveEnd={view.onMoveEnd}
+        minZoom={0.05}
+        maxZoom={4}
+        snapToGrid
+        snapGrid={SNAP}
+        nodeDragThreshold={4}
+        onlyRenderVisibleElements
+        zoomOnDoubleClick={false}
+        nodesConnectable={false}
+        nodesFocusable={false}
+        elevateNodesOnSelect
+        disableKeyboardA11y
+        deleteKeyCode={null}
+        panActivationKeyCode="Space"
+        multiSelectionKeyCode={MULTI}
+        proOptions={PRO}
+      >
+        <Background variant={BackgroundVariant.Dots} gap={16} size={1} color="var(--grid)" />
+        {layout && (
+          <ViewportPortal>
+            <div className="under">
+              <Wires layout={layout} moved={moved} />
+              <MovedWires layout={layout} nodes={nodes} moved={moved} />
+            </div>
+            <Tags layout={layout} />
+          </ViewportPortal>
+        )}
+        {layout && view.level === "far" && <FarOverlay layout={layout} />}
+        {view.partly && <Mini />}
+      </ReactFlow>
+      {rect && <WireDrag spots={spots} offset={rect} />}
+      <ValueTip />
+      {layout?.view === "activity" && <ActivityLegend hidden={layout.hidden} />}
+      <Zoomer zoom={view.zoom} showAll={view.showAll} />
+      {layout?.nodes.length === 0 && <p className="nothing-here">Nothing here yet. Press Tab to add a node, or drop a file.</p>}
+    </main>
+  );
+}
+
+const NO_EDGES: never[] = [];
+const SNAP: [number, number] = [8, 8];
+const MULTI = ["Control", "Meta", "Shift"];
+const PRO = { hideAttribution: false };
+
+function ActivityLegend({ hidden }: { hidden: number }) {
+  return (
+    <div className="legend" style={{ right: 12, bottom: "auto", top: 12 }}>
+      <span>
+        <svg width="28" height="8" aria-hidden="true">
+          <path d="M0 4h28" className="wire act" />
+          <path d="M0 4h28" className="wire core" />
+        </svg>
+        activity
+      </span>
+      <span>
+        <svg width="28" height="8" aria-hidden="true">
+          <path d="M0 4h28" stroke="var(--edge)" strokeWidth="1.5" />
+        </svg>
+        data it asks for
+      </span>
+      <span>
+        <i style={{ border: "2px solid var(--on)", background: "none" }} />
+        active
+      </span>
+      <span className="muted num">{hidden} edges hidden</span>
+    </div>
+  );
+}

@@ -1,0 +1,72 @@
+import { useEffect, useRef } from "react";
+import { paintMeasures } from "../live/measures";
+import type { Measure } from "../protocol/frames";
+import type { NodeBox } from "../protocol/types";
+import { onTheme } from "../ui/colours";
+import { duration, percent, rate } from "../ui/words";
+import { drawBars } from "./bars";
+import { isBig, isHelper } from "./NodeView";
+
+interface Props {
+  box: NodeBox;
+  top: number;
+  missing: string;
+  failed: boolean;
+}
+
+/** Bars, median and rate of a node. React draws them once; the figures are painted from outside of it. */
+export function MeasureRow({ box, top, missing, failed }: Props) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const median = useRef<HTMLSpanElement>(null);
+  const speed = useRef<HTMLSpanElement>(null);
+  const extra = useRef<HTMLDivElement>(null);
+  const helper = isHelper(box);
+  const wide = helper ? 56 : isBig(box) ? 64 : 96;
+  const tall = helper ? 14 : 16;
+
+  useEffect(() => {
+    if (missing !== "") return;
+    let last: Measure | null = null;
+    const paint = (measure: Measure, slow: boolean) => {
+      last = measure;
+      if (canvas.current) drawBars(canvas.current, measure);
+      if (!slow) return;
+      if (median.current) median.current.textContent = measure.count > 0 ? duration(measure.median) : "–";
+      if (speed.current) speed.current.textContent = rate(measure.rate);
+      if (extra.current) extra.current.textContent = more(measure);
+    };
+    const stop = paintMeasures(box.id, paint);
+    const unlisten = onTheme(() => last && paint(last, true));
+    return () => {
+      stop();
+      unlisten();
+    };
+  }, [box.id, missing]);
+
+  if (missing !== "") {
+    return (
+      <div className="m" style={{ top }} title={missing}>
+        not installed
+      </div>
+    );
+  }
+  return (
+    <>
+      {!helper && <div className="xtra num" ref={extra} />}
+      <div className="m num" style={{ top }}>
+        <canvas ref={canvas} width={wide * 2} height={tall * 2} style={{ width: wide, height: tall }} />
+        <span className="sp" />
+        {failed ? <span className="fail">failed</span> : !helper && <span ref={median}>–</span>}
+        <span ref={speed} style={helper ? undefined : { minWidth: 42, textAlign: "right" }}>
+          idle
+        </span>
+      </div>
+    </>
+  );
+}
+
+function more(measure: Measure): string {
+  const parts = [`99 % ${duration(measure.p99)}`, `active ${percent(measure.activeShare)}`];
+  if (measure.state === "waiting") parts.push("waits");
+  return parts.join(" · ");
+}

@@ -1,0 +1,80 @@
+import type { Node, NodeProps } from "@xyflow/react";
+import { memo } from "react";
+import type { NodeBox } from "../protocol/types";
+import { activeInside, groupClass, limitOf } from "../state/looking";
+import { isInside } from "../state/paths";
+import { useStudio } from "../state/studio";
+import { MeasureRow } from "./MeasureRow";
+import { NodePorts } from "./NodePorts";
+import { NodeTitle } from "./NodeTitle";
+import { WhereLine } from "./WhereLine";
+
+export type HfgNode = Node<{ box: NodeBox; plain: boolean }, "hfg">;
+
+export const isHelper = (box: NodeBox): boolean => box.height < 68;
+export const isBig = (box: NodeBox): boolean => box.height > 96;
+
+/** Where the rows of a node are, from its upper edge. */
+export function rowsOf(box: NodeBox): { title: number; measure: number } {
+  const slots = box.ports.some((port) => port.kind === "slot" && port.says !== "");
+  if (isHelper(box)) {
+    const title = slots ? 16 : 3;
+    return { title, measure: title + 20 };
+  }
+  return isBig(box) ? { title: 20, measure: box.height - 38 } : { title: 17, measure: 38 };
+}
+
+function useLook(path: string) {
+  const active = useStudio((s) => path in s.activity.since);
+  const inside = useStudio((s) => activeInside(s.activity, path));
+  const failed = useStudio((s) => s.tables.studio.run?.error?.path === path || hasError(s.tables.problems, path));
+  const selected = useStudio((s) => s.selection.has(path));
+  const within = useStudio((s) => [...s.selection].some((one) => isInside(one, path)));
+  const brk = useStudio((s) => s.tables.breakpoints[path]);
+  return { active: active || inside !== null, inside, failed, selected, within, brk };
+}
+
+function hasError(problems: Record<string, { path: string; severity: string; source: string }>, path: string): boolean {
+  return Object.values(problems).some((one) => one.severity === "error" && one.path === path && one.source === "run");
+}
+
+function NodeViewPlain({ data }: NodeProps<HfgNode>) {
+  const { box, plain } = data;
+  const path = box.id;
+  const record = useStudio((s) => s.tables.nodes[path]);
+  const group = useStudio((s) => groupClass(s.tables, record?.group ?? box.group));
+  const look = useLook(path);
+  const rows = rowsOf(box);
+  const limit = limitOf(record);
+  const classes = [
+    "node",
+    group,
+    box.kind === "subgraph" && !box.is_open && "sub",
+    isHelper(box) && "helper",
+    isBig(box) && "big",
+    look.active && "active",
+    look.failed && "bad failed",
+    look.selected && "sel",
+    !look.selected && look.within && "within",
+    record?.enabled === false && "off",
+    record?.missing && "missing",
+  ];
+  const label = `${box.name}, ${look.active ? "active, " : ""}${box.type_name}, group ${record?.group ?? box.group}`;
+  return (
+    <>
+      <div className={classes.filter(Boolean).join(" ")} data-node={path} role="img" aria-label={label}>
+        <i className="stripe" />
+        {look.brk && <i className={look.brk.holds ? "brk holds" : "brk"} title="The run pauses here (F9)" />}
+        <NodeTitle box={box} record={record} top={plain && !look.inside ? box.height / 2 - 10 : rows.title} plain={plain} />
+        {look.inside !== null ? (
+          <WhereLine path={path} inside={look.inside} top={rows.measure} />
+        ) : (
+          !plain && <MeasureRow box={box} top={rows.measure} missing={record?.missing ?? ""} failed={look.failed} />
+        )}
+      </div>
+      {!plain && <NodePorts box={box} path={path} active={look.active} limit={limit} />}
+    </>
+  );
+}
+
+export const NodeView = memo(NodeViewPlain);

@@ -1,0 +1,127 @@
+import { memo, useEffect, useRef } from "react";
+import { onPulse, PULSE_MS } from "../live/activity";
+import type { LayoutLine, LayoutRecord } from "../protocol/types";
+import { edgeKey, nodeOf } from "../state/paths";
+import { useStudio } from "../state/studio";
+import { pointsDown, rounded, tipOf } from "./geometry";
+
+export const keysOf = (line: LayoutLine): string[] => line.edges.map((edge) => edgeKey(edge.source, edge.target));
+
+/** All lines of a level, exactly as the layout routes them: data below, activity above, its last way on top. */
+export function Wires({ layout, moved }: { layout: LayoutRecord; moved: ReadonlySet<string> }) {
+  const ways = useStudio((s) => s.activity.ways);
+  const picked = useStudio((s) => s.selectedEdge);
+  const nodes = useStudio((s) => s.tables.nodes);
+  const lines = layout.lines.filter((line) => !line.edges.some((e) => moved.has(nodeOf(e.source)) || moved.has(nodeOf(e.target))));
+  const draw = (line: LayoutLine) => {
+    const keys = keysOf(line);
+    const off = line.edges.some((e) => nodes[nodeOf(e.source)]?.enabled === false || nodes[nodeOf(e.target)]?.enabled === false);
+    return (
+      <Wire
+        key={keys.join()}
+        line={line}
+        hot={line.is_active && keys.some((key) => ways.has(key))}
+        picked={picked !== null && keys.includes(picked)}
+        off={off}
+        plain={layout.view === "activity"}
+      />
+    );
+  };
+  const active = lines.filter((line) => line.is_active);
+  const isHot = (line: LayoutLine) => keysOf(line).some((key) => ways.has(key));
+  return (
+    <svg width="10" height="10" role="presentation">
+      <g className="layer-data">{lines.filter((line) => !line.is_active).map(draw)}</g>
+      <g className="layer-act">{active.filter((line) => !isHot(line)).map(draw)}</g>
+      <g className="layer-hot">{active.filter(isHot).map(draw)}</g>
+      <Pulses layout={layout} />
+    </svg>
+  );
+}
+
+interface WireProps {
+  line: LayoutLine;
+  hot: boolean;
+  picked: boolean;
+  off: boolean;
+  plain: boolean;
+}
+
+const Wire = memo(function Wire({ line, hot, picked, off, plain }: WireProps) {
+  const path = rounded(line.points, plain ? 9 : 7);
+  const ends = new Set(line.edges.flatMap((edge) => [nodeOf(edge.source), nodeOf(edge.target)]));
+  const more = `${hot ? " hot" : ""}${picked ? " picked" : ""}${off ? " off" : ""}`;
+  const bundle = line.edges.length > 1;
+  const flow = plain ? `activity-data${line.kind === "signal" ? " dash" : ""}` : line.kind === "signal" ? (bundle ? "sigb" : "sig") : bundle ? "data bundle" : "data";
+  const sync = line.kind === "data" ? " sync" : "";
+  const joint = line.is_active ? `joint${hot ? " hot" : ""}` : "jointd";
+  return (
+    <g className="wire-group" data-ends={[...ends].join(" ")} data-edges={keysOf(line).join("\n")}>
+      <path className="wire halo" d={path} style={line.is_active ? { strokeWidth: plain ? 10 : 9 } : undefined} />
+      {line.is_active ? (
+        <>
+          <path className={`wire act${sync}${more}`} d={path} />
+          <path className={`wire core${hot ? " hotc" : ""}`} d={path} />
+          <path className={`tip${sync}${hot ? " hot" : ""}`} d={tipOf(line.points)} />
+        </>
+      ) : (
+        <>
+          <path className={`wire ${flow}${more}`} d={path} />
+          {(plain || pointsDown(line.points)) && !bundle && <path className={plain ? "tip sync" : "tip d"} d={tipOf(line.points)} />}
+        </>
+      )}
+      {line.combs.map((comb) => (
+        <path key={comb.join()} className={`wire thin ${line.kind === "signal" ? "sig" : "data"}`} d={rounded(comb, 0)} />
+      ))}
+      {line.dots.map((dot) => (
+        <circle key={dot.join()} className={joint} cx={dot[0]} cy={dot[1]} r={line.is_active ? 4 : 3} />
+      ))}
+      {line.count_at && bundle && <Count at={line.count_at} count={line.edges.length} />}
+      {line.says !== "" && line.says_at && <Words x={line.says_at[0]} y={line.says_at[1]} text={line.says} plain={plain} />}
+      <path className="wire hit" d={path} />
+    </g>
+  );
+});
+
+function Count({ at, count }: { at: readonly [number, number]; count: number }) {
+  return (
+    <>
+      <rect className="count-pill" x={at[0] - 9} y={at[1] - 8} width="18" height="16" rx="8" />
+      <text className="wlabel" style={{ fontWeight: 600 }} x={at[0]} y={at[1] + 4} textAnchor="middle">
+        {count}
+      </text>
+    </>
+  );
+}
+
+function Words({ x, y, text, plain }: { x: number; y: number; text: string; plain: boolean }) {
+  return (
+    <text className={plain ? "wlabel plain" : "wlabel"} x={x} y={y}>
+      {text}
+    </text>
+  );
+}
+
+/** A hand-over runs along its line before the ring appears at the end. */
+function Pulses({ layout }: { layout: LayoutRecord }) {
+  const group = useRef<SVGGElement>(null);
+  useEffect(
+    () =>
+      onPulse((edges) => {
+        for (const line of layout.lines) {
+          if (!line.is_active || !keysOf(line).some((key) => edges.includes(key))) continue;
+          const pulse = document.createElementNS("http://www.w3.org/2000/svg", "path");
+          pulse.setAttribute("class", "wire pulse");
+          pulse.setAttribute("d", rounded(line.points));
+          pulse.setAttribute("pathLength", "100");
+          pulse.setAttribute("stroke-dasharray", "14 200");
+          group.current?.append(pulse);
+          const run = pulse.animate([{ strokeDashoffset: 14 }, { strokeDashoffset: -100 }], { duration: PULSE_MS });
+          run.onfinish = () => pulse.remove();
+          run.oncancel = run.onfinish;
+        }
+      }),
+    [layout],
+  );
+  return <g ref={group} />;
+}

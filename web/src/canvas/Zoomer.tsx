@@ -1,0 +1,43 @@
+import { MiniMap, useReactFlow } from "@xyflow/react";
+import { arrange } from "../state/actions";
+import { studio } from "../state/studio";
+import { Icon } from "../ui/Icon";
+import type { HfgNode } from "./NodeView";
+
+export function Zoomer({ zoom, showAll }: { zoom: number; showAll: () => void }) {
+  const flow = useReactFlow();
+  return (
+    <div className="zoomer">
+      <button type="button" className="btn" aria-label="Zoom out" onClick={() => void flow.zoomOut({ duration: 120 })}>
+        <Icon name="minus" />
+      </button>
+      <button type="button" className="btn num" style={{ minWidth: 48 }} aria-label="Zoom to 100 %" onClick={() => void flow.zoomTo(1, { duration: 120 })}>
+        {Math.round(zoom * 100)} %
+      </button>
+      <button type="button" className="btn" aria-label="Zoom in" onClick={() => void flow.zoomIn({ duration: 120 })}>
+        <Icon name="plus" />
+      </button>
+      <button type="button" className="btn" aria-label="Show all (Home)" title="Show all (Home)" onClick={showAll}>
+        <Icon name="fit" />
+      </button>
+      <button type="button" className="btn" aria-label="Lay out" title="Lay out all, or the selection" onClick={() => void arrange(null)}>
+        <Icon name="layout" />
+      </button>
+    </div>
+  );
+}
+
+const GROUP_COLOURS = ["var(--line2)", "var(--g1)", "var(--g2)", "var(--g3)", "var(--g4)"];
+
+function miniColour(node: HfgNode): string {
+  const { tables, activity } = studio();
+  const path = node.id;
+  if (Object.keys(activity.since).some((one) => one === path || one.startsWith(`${path}/`))) return "var(--on)";
+  if (tables.studio.run?.error?.path.startsWith(path)) return "var(--bad)";
+  const number = tables.groups[tables.nodes[path]?.group ?? ""]?.number ?? 0;
+  return GROUP_COLOURS[number === 0 ? 0 : ((number - 1) % 4) + 1]!;
+}
+
+export function Mini() {
+  return <MiniMap<HfgNode> className="mini" pannable zoomable nodeColor={miniColour} nodeBorderRadius={8} ariaLabel="Overview of this level" />;
+}

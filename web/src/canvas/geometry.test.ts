@@ -1,0 +1,36 @@
+import { describe, expect, it } from "vitest";
+import { allInView, firstView, rounded, tipOf, zoomOf } from "./geometry";
+
+describe("lines", () => {
+  it("have rounded corners that are no larger than half of a side", () => {
+    expect(rounded([[0, 0], [0, 6], [40, 6]])).toBe("M0 0L0 3Q0 6 3 6L40 6");
+  });
+  it("go straight through a corner that is none", () => {
+    expect(rounded([[0, 0], [0, 0], [10, 0]])).toBe("M0 0L10 0");
+  });
+  it("end in a tip before the port", () => {
+    expect(tipOf([[0, 0], [0, 20]])).toBe("M0 15L-4 9L4 9z");
+  });
+  it("of nothing are nothing", () => {
+    expect(rounded([])).toBe("");
+    expect(tipOf([[1, 1]])).toBe("");
+  });
+});
+
+describe("the first view of a level", () => {
+  it("shows all of it where one can read it then", () => {
+    expect(firstView(1112, 724, 1076, 643).zoom).toBeCloseTo(0.89, 2);
+  });
+  it("shows the upper end of a high level, and not less of its width", () => {
+    const view = firstView(880, 1200, 1076, 643);
+    expect(view.zoom).toBeCloseTo(0.89, 2);
+    expect(view.y).toBe(24);
+  });
+  it("never enlarges", () => {
+    expect(firstView(100, 100, 1076, 643).zoom).toBe(1);
+    expect(allInView(100, 100, 1076, 643).zoom).toBe(1);
+  });
+  it("is far, middle or near", () => {
+    expect([0.44, 0.45, 1.25, 1.26].map(zoomOf)).toEqual(["far", "middle", "middle", "near"]);
+  });
+});

@@ -1,0 +1,59 @@
+import type { Point } from "../protocol/types";
+
+/** The path of corners, each rounded as far as its two sides allow. */
+export function rounded(points: readonly Point[], radius = 7): string {
+  const first = points[0];
+  if (!first) return "";
+  let path = `M${first[0]} ${first[1]}`;
+  for (let index = 1; index < points.length - 1; index++) {
+    const [a, b, c] = [points[index - 1]!, points[index]!, points[index + 1]!];
+    const before = Math.hypot(b[0] - a[0], b[1] - a[1]);
+    const after = Math.hypot(c[0] - b[0], c[1] - b[1]);
+    const r = Math.min(radius, before / 2, after / 2);
+    if (r === 0) continue;
+    path += `L${b[0] - ((b[0] - a[0]) / before) * r} ${b[1] - ((b[1] - a[1]) / before) * r}`;
+    path += `Q${b[0]} ${b[1]} ${b[0] + ((c[0] - b[0]) / after) * r} ${b[1] + ((c[1] - b[1]) / after) * r}`;
+  }
+  const last = points.at(-1)!;
+  return `${path}L${last[0]} ${last[1]}`;
+}
+
+/** The tip at the end of a line, before the port that lies there. */
+export function tipOf(points: readonly Point[]): string {
+  const [p, q] = [points.at(-2), points.at(-1)];
+  if (!p || !q) return "";
+  const dx = Math.sign(q[0] - p[0]);
+  const dy = Math.sign(q[1] - p[1]);
+  const [x, y] = [q[0] - dx * 5, q[1] - dy * 5];
+  return `M${x} ${y}L${x - dx * 6 - dy * 4} ${y - dy * 6 - dx * 4}L${x - dx * 6 + dy * 4} ${y - dy * 6 + dx * 4}z`;
+}
+
+export const pointsDown = (points: readonly Point[]): boolean => {
+  const [p, q] = [points.at(-2), points.at(-1)];
+  return p !== undefined && q !== undefined && p[0] === q[0] && q[1] > p[1];
+};
+
+/** The line that follows the mouse. */
+export function loose(from: Point, to: Point, upright: boolean): string {
+  const bend = Math.max(24, Math.min(120, Math.hypot(to[0] - from[0], to[1] - from[1]) / 2));
+  if (upright) return `M${from[0]} ${from[1]}C${from[0]} ${from[1] + bend},${to[0]} ${to[1] - bend},${to[0]} ${to[1]}`;
+  return `M${from[0]} ${from[1]}C${from[0] + bend} ${from[1]},${to[0] - bend} ${to[1]},${to[0]} ${to[1]}`;
+}
+
+export type Zoom = "far" | "middle" | "near";
+export const zoomOf = (z: number): Zoom => (z < 0.45 ? "far" : z <= 1.25 ? "middle" : "near");
+
+/** How a level is shown first: all of it if one can read it then, else its upper end at a size that one can read. */
+export function firstView(width: number, height: number, canvasWidth: number, canvasHeight: number) {
+  const room = 48;
+  const wide = (canvasWidth - room) / Math.max(1, width);
+  const all = Math.min(wide, (canvasHeight - room) / Math.max(1, height));
+  const zoom = Math.max(0.08, Math.min(1, Math.max(all, Math.min(wide, 0.89))));
+  const y = height * zoom > canvasHeight - room ? 24 : (canvasHeight - height * zoom) / 2;
+  return { x: (canvasWidth - width * zoom) / 2, y, zoom };
+}
+
+export function allInView(width: number, height: number, canvasWidth: number, canvasHeight: number) {
+  const zoom = Math.max(0.08, Math.min(1, (canvasWidth - 48) / Math.max(1, width), (canvasHeight - 48) / Math.max(1, height)));
+  return { x: (canvasWidth - width * zoom) / 2, y: (canvasHeight - height * zoom) / 2, zoom };
+}

@@ -1,0 +1,124 @@
+import type { Fit, LayoutRecord, PortKind, Targets } from "../protocol/types";
+import { connect, disconnect, isSource, locked, question, reconnect, toast } from "../state/actions";
+import { endsOf, nodeOf } from "../state/paths";
+import { change, studio } from "../state/studio";
+
+export interface Spot {
+  path: string;
+  kind: PortKind;
+  x: number;
+  y: number;
+}
+
+const SNAP_PX = 24;
+
+/** All ports of a level with their places, by path. */
+export function spotsOf(layout: LayoutRecord): Map<string, Spot> {
+  const spots = new Map<string, Spot>();
+  for (const box of layout.nodes) {
+    for (const port of box.ports) {
+      const path = `${box.id}.${port.name}`;
+      spots.set(path, { path, kind: port.kind, x: port.x, y: port.y });
+    }
+  }
+  return spots;
+}
+
+export function nearest(spots: Map<string, Spot>, x: number, y: number, zoom: number, from: string): string | null {
+  let best: string | null = null;
+  let least = SNAP_PX / zoom;
+  for (const spot of spots.values()) {
+    const distance = Math.hypot(spot.x - x, spot.y - y);
+    if (distance < least && spot.path !== from) {
+      least = distance;
+      best = spot.path;
+    }
+  }
+  return best;
+}
+
+/** Which edge a drag moves: one that leads to an input which can have no second one. */
+function movedEdge(port: string, kind: string): string {
+  if (kind !== "input" && kind !== "parameter") return "";
+  const found = Object.keys(studio().tables.edges).find((key) => endsOf(key)[1] === port);
+  return found ?? "";
+}
+
+/** Press on a port: what an edge may lead to comes from the studio, once, with the reasons for all refusals. */
+export async function beginWire(port: string, kind: string, at: { x: number; y: number }, screen: { x: number; y: number }) {
+  const why = locked();
+  if (why !== "") {
+    toast(why, { kind: "warn" });
+    return;
+  }
+  const moving = movedEdge(port, kind);
+  const from = moving === "" ? port : endsOf(moving)[0];
+  change({ wire: { from, moving, targets: null, over: null, point: at, screen, active: false } });
+  try {
+    const targets = await question<Targets>("targets", { port: from, moving });
+    const wire = studio().wire;
+    if (wire?.from !== from) return;
+    change({ wire: { ...wire, targets } });
+    light(targets, from);
+  } catch (error) {
+    change({ wire: null });
+    toast(error instanceof Error ? error.message : String(error), { kind: "bad" });
+  }
+}
+
+/** Marks go straight to the elements: hundreds of ports light up within a frame. */
+function light(targets: Targets, from: string): void {
+  const takes = new Set<string>([nodeOf(from)]);
+  for (const element of document.querySelectorAll<HTMLElement>("#canvas [data-port]")) {
+    const path = element.dataset.port ?? "";
+    const fit = targets.ports[path]?.fit;
+    element.classList.toggle("from", path === from);
+    element.classList.toggle("expects", fit === "expects");
+    element.classList.toggle("any", fit === "takes");
+    if (fit === "expects" || fit === "takes") takes.add(nodeOf(path));
+  }
+  for (const element of document.querySelectorAll<HTMLElement>("#canvas [data-node]")) {
+    element.classList.toggle("takes", takes.has(element.dataset.node ?? ""));
+  }
+}
+
+function unlight(): void {
+  for (const element of document.querySelectorAll("#canvas :is(.from, .expects, .any, .takes)")) {
+    element.classList.remove("from", "expects", "any", "takes");
+  }
+}
+
+export function endWire(): void {
+  change({ wire: null });
+  unlight();
+}
+
+export const fitOf = (port: string | null): Fit | undefined =>
+  port === null ? undefined : studio().wire?.targets?.ports[port];
+
+/** Drop: connect, move, cut, or choose what lies between. */
+export async function dropWire(place: { x: number; y: number }): Promise<void> {
+  const wire = studio().wire;
+  endWire();
+  if (!wire) return;
+  const fit = wire.over === null ? undefined : wire.targets?.ports[wire.over];
+  if (wire.over === null) {
+    if (wire.moving !== "") await disconnect(wire.moving);
+    else openPalette(wire.from, wire.screen, place);
+    return;
+  }
+  if (fit === undefined) return;
+  if (fit.fit === "refused") {
+    openPalette(wire.from, wire.screen, place);
+    return;
+  }
+  const [source, target] = isSource(wire.from) ? [wire.from, wire.over] : [wire.over, wire.from];
+  if (wire.moving !== "") await reconnect(wire.moving, source, target);
+  else await connect(source, target, wire.active);
+}
+
+export function openPalette(port: string, screen: { x: number; y: number }, place: { x: number; y: number }, words = ""): void {
+  const why = locked();
+  if (why !== "") toast(why, { kind: "warn" });
+  else change({ popover: "palette", palette: { screen, place, port, words } });
+}

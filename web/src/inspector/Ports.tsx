@@ -1,0 +1,51 @@
+import { useEffect, useRef } from "react";
+import type { PortRecord, Value } from "../protocol/types";
+import { pin } from "../state/actions";
+import { socket } from "../state/link";
+import { useStudio } from "../state/studio";
+import { rate } from "../ui/words";
+
+export function Ports({ path }: { path: string }) {
+  const ports = useStudio((s) => s.tables.nodes[path]?.ports);
+  const shown = ports?.filter((port) => port.kind !== "parameter" && (!port.auto || port.used)) ?? [];
+  if (shown.length === 0) return null;
+  return (
+    <div className="sec">
+      <h3>
+        Ports<span className="sp" />
+        <small>last value</small>
+      </h3>
+      {shown.map((port) => (
+        <PortRow key={`${port.kind}.${port.name}`} port={port} />
+      ))}
+    </div>
+  );
+}
+
+function PortRow({ port }: { port: PortRecord }) {
+  const value = useRef<HTMLSpanElement>(null);
+  const speed = useRef<HTMLSpanElement>(null);
+  const pinned = useStudio((s) => s.pins.includes(port.path));
+  useEffect(() => {
+    const subscription = socket.subscribe("value", { path: port.path }, 4, (next) => {
+      const one = next as Value;
+      if (value.current) value.current.textContent = one.kind === "none" ? "" : one.summary;
+      if (speed.current) speed.current.textContent = one.seen > 0 ? rate(one.rate_hz) : "never";
+    });
+    return subscription.end;
+  }, [port.path]);
+  const round = port.kind === "slot" || port.kind === "event";
+  return (
+    <div className="prt">
+      <i className={round ? "ci" : "sq"} title={port.kind} />
+      <span>
+        <button type="button" title={pinned ? "unpin" : "pin a probe"} aria-pressed={pinned} onClick={() => pin(port.path)}>
+          {port.name}
+        </button>
+        <em>{port.type}</em>
+      </span>
+      <span className="v num" ref={value} />
+      <span className="r num" ref={speed} />
+    </div>
+  );
+}

@@ -1,0 +1,6 @@
+import { newGesture } from "../../state/actions";
+import type { WidgetProps } from "../Parameter";
+
+export function Switch({ id, value, off, set }: WidgetProps) {
+  return <input id={id} type="checkbox" checked={value === true} disabled={off} onChange={(event) => set(event.target.checked, newGesture())} />;
+}

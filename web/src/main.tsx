@@ -1,0 +1,17 @@
+import "./styles/index.css";
+import { createRoot } from "react-dom/client";
+import { App } from "./App";
+import { watchActivity } from "./live/activity";
+import { socket, watchAge } from "./state/link";
+import { change, studio } from "./state/studio";
+import { applyTheme } from "./ui/colours";
+
+applyTheme(studio().theme);
+createRoot(document.getElementById("app")!).render(<App />);
+watchActivity();
+watchAge();
+socket.connect();
+document.addEventListener("visibilitychange", () => socket.send({ t: "visible", on: !document.hidden }));
+window.addEventListener("resize", () => {
+  if (window.innerWidth <= 1100 && studio().side) change({ side: false });
+});

@@ -1,0 +1,106 @@
+import { type KeyboardEvent, useEffect, useRef, useState } from "react";
+import type { Found, FoundRow } from "../protocol/types";
+import { addNode, question, toast } from "../state/actions";
+import { nameOf, nodeOf, portOf } from "../state/paths";
+import { change, type PaletteAt, useStudio } from "../state/studio";
+import { Icon } from "../ui/Icon";
+import { NodeTypeDoc } from "./NodeTypeDoc";
+import { Rows } from "./Rows";
+
+const WIDTH = 648;
+const HEIGHT = 404;
+
+export function Palette() {
+  const at = useStudio((s) => (s.popover === "palette" ? s.palette : null));
+  return at && <PaletteAtPlace key={`${at.screen.x} ${at.screen.y} ${at.port}`} at={at} />;
+}
+
+/** Type, choose, add: at the place where it was asked for, connected to the wire that was dropped. */
+function PaletteAtPlace({ at }: { at: PaletteAt }) {
+  const [words, setWords] = useState(at.words);
+  const [port, setPort] = useState(at.port);
+  const [found, setFound] = useState<Found | null>(null);
+  const [index, setIndex] = useState(0);
+  const asked = useRef(0);
+  const sends = useStudio((s) => s.tables.nodes[nodeOf(port)]?.ports.find((one) => one.path === port)?.type ?? "");
+
+  useEffect(() => {
+    const turn = ++asked.current;
+    question<Found>("search", { words, port, category: "", most: 50 }).then(
+      (next) => {
+        if (turn !== asked.current) return;
+        setFound(next);
+        setIndex(0);
+      },
+      (error: Error) => toast(error.message, { kind: "bad" }),
+    );
+  }, [words, port]);
+
+  const rows = found?.rows ?? [];
+  const row = rows[index];
+  const close = () => change({ popover: null, palette: null });
+  const add = (one: FoundRow | undefined, connected: boolean) => {
+    if (!one) return;
+    close();
+    void addNode(one, at.place, connected && one.fit !== "refused" ? port : "");
+  };
+  const key = (event: KeyboardEvent) => {
+    event.stopPropagation();
+    if (event.key === "Escape") close();
+    if (event.key === "ArrowDown") setIndex(Math.min(rows.length - 1, index + 1));
+    if (event.key === "ArrowUp") setIndex(Math.max(0, index - 1));
+    if (event.key === "Enter") add(row, !event.altKey);
+    if (["ArrowDown", "ArrowUp", "Enter", "Tab"].includes(event.key)) event.preventDefault();
+  };
+  const left = Math.max(52, Math.min(at.screen.x, window.innerWidth - WIDTH - 12));
+  const top = Math.max(52, Math.min(at.screen.y, window.innerHeight - HEIGHT - 36));
+  return (
+    <div className="away" onPointerDown={(event) => event.target === event.currentTarget && close()}>
+      <div className="pop palette grows" style={{ left, top, position: "fixed" }} role="dialog" aria-label="Add a node" onKeyDown={key}>
+        <div className="in">
+          <Icon name="find" />
+          <input
+            autoFocus
+            value={words}
+            placeholder="Which node?"
+            aria-label="Which node?"
+            role="combobox"
+            aria-expanded="true"
+            aria-controls="palette-rows"
+            aria-activedescendant={row ? `row-${row.reference}` : undefined}
+            onChange={(event) => setWords(event.target.value)}
+          />
+          {port !== "" && (
+            <span className="chipf">
+              takes {sends || "this"}, from {nameOf(nodeOf(port))}.{portOf(port)}
+              <button type="button" className="btn small" style={{ color: "inherit", height: 20, minWidth: 20, padding: 0 }} aria-label="Show all node types" onClick={() => setPort("")}>
+                <Icon name="close" />
+              </button>
+            </span>
+          )}
+        </div>
+        <Rows found={found} words={words} index={index} choose={setIndex} add={(one) => add(one, true)} />
+        <div className="doc" tabIndex={-1}>
+          {row && <NodeTypeDoc row={row} port={port} />}
+        </div>
+        <div className="ft">
+          <span>
+            <kbd>↑</kbd> <kbd>↓</kbd> choose
+          </span>
+          <span>
+            <kbd>Enter</kbd> {port === "" ? "add" : "add and connect"}
+          </span>
+          {port !== "" && (
+            <span>
+              <kbd>Alt Enter</kbd> add only
+            </span>
+          )}
+          <span className="spring" />
+          <span className="num">
+            {rows.length} of {found?.total ?? "…"} node types
+          </span>
+        </div>
+      </div>
+    </div>
+  );
+}

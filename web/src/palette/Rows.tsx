@@ -1,0 +1,63 @@
+import { useEffect, useRef } from "react";
+import type { Found, FoundRow } from "../protocol/types";
+
+interface Props {
+  found: Found | null;
+  words: string;
+  index: number;
+  choose: (index: number) => void;
+  add: (row: FoundRow) => void;
+}
+
+/** What fits first; what does not is below, with the reason, and can still be added. */
+export function Rows({ found, words, index, choose, add }: Props) {
+  const list = useRef<HTMLUListElement>(null);
+  useEffect(() => {
+    list.current?.querySelector(".sel")?.scrollIntoView({ block: "nearest" });
+  }, [index]);
+  const rows = found?.rows ?? [];
+  if (found && rows.length === 0) {
+    return (
+      <ul id="palette-rows" role="listbox" aria-label="Node types">
+        <li className="hd" role="option" aria-selected="false">
+          No node type speaks of “{words}”.{found.near.length > 0 && ` Near it: ${found.near.join(", ")}.`}
+        </li>
+      </ul>
+    );
+  }
+  const firstRefused = rows.findIndex((row) => row.fit === "refused");
+  return (
+    <ul id="palette-rows" role="listbox" aria-label="Node types" ref={list}>
+      {rows.map((row, at) => (
+        <li
+          key={row.reference + row.port}
+          id={`row-${row.reference}`}
+          role="option"
+          aria-selected={at === index}
+          className={`${at === index ? "sel" : ""}${row.fit === "refused" ? " no" : ""}${at === firstRefused ? " first-no" : ""}`}
+          onPointerDown={() => choose(at)}
+          onDoubleClick={() => add(row)}
+        >
+          <span className="cat">{row.category}</span>
+          <b>
+            <Marked text={row.name || row.title} words={words} />
+          </b>
+          <div>{row.fit === "refused" ? row.message : <Marked text={row.summary} words={words} />}</div>
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+function Marked({ text, words }: { text: string; words: string }) {
+  const word = words.trim().toLowerCase();
+  const at = word === "" ? -1 : text.toLowerCase().indexOf(word);
+  if (at < 0) return <>{text}</>;
+  return (
+    <>
+      {text.slice(0, at)}
+      <mark>{text.slice(at, at + word.length)}</mark>
+      {text.slice(at + word.length)}
+    </>
+  );
+}

@@ -1,0 +1,87 @@
+import { useEffect, useState } from "react";
+import type { Data, Value } from "../protocol/types";
+import { pin } from "../state/actions";
+import { socket } from "../state/link";
+import { Icon } from "../ui/Icon";
+import { moment, rate, short } from "../ui/words";
+import { ImageView } from "./ImageView";
+import { Plot } from "./Plot";
+
+/** What goes over a port or an edge, as the kind of its values asks for: image, plot, table or text. */
+export function Probe({ path }: { path: string }) {
+  const [value, setValue] = useState<Value | null>(null);
+  const [why, setWhy] = useState("");
+  useEffect(() => socket.subscribe("value", { path }, 4, (next) => setValue(next as Value), setWhy).end, [path]);
+  const shape = value?.shape ? ` · ${[...value.shape].join("×")}` : "";
+  return (
+    <section className="probe" aria-label={`Probe of ${path}`}>
+      <header>
+        <button type="button" className="btn small" style={{ padding: 0 }} aria-label={`Unpin ${path}`} onClick={() => pin(path)}>
+          <Icon name="pin" />
+        </button>
+        <b>{path.replace(" -> ", " → ")}</b>
+        <span className="sp" />
+        <span className="r num">{value ? `${value.kind === "number" ? value.summary : rate(value.rate_hz)}${shape}` : ""}</span>
+      </header>
+      {value ? <Body path={path} value={value} /> : <div className="text">{why || "Nothing was sent yet."}</div>}
+    </section>
+  );
+}
+
+function Body({ path, value }: { path: string; value: Value }) {
+  if (value.message !== "") return <div className="text">{value.message}</div>;
+  switch (value.kind) {
+    case "image":
+      return <ImageView path={path} caption={`${value.summary} · ${moment(value.time)}`} />;
+    case "number":
+      return <Plot path={path} />;
+    case "table":
+    case "record":
+      return <Table data={value.data} />;
+    default:
+      return <div className="text num">{value.data === null || value.data === undefined ? value.summary : pretty(value.data)}</div>;
+  }
+}
+
+const pretty = (data: Data): string => (typeof data === "object" ? JSON.stringify(data, null, 1) : String(data));
+
+function Table({ data }: { data: Data }) {
+  const rows = Array.isArray(data) ? data : [data];
+  const first = rows.find((row) => row !== null && typeof row === "object" && !Array.isArray(row)) as Record<string, Data> | undefined;
+  const names = first ? Object.keys(first) : [];
+  if (names.length === 0) return <div className="text num">{pretty(data)}</div>;
+  if (rows.length === 1) {
+    return (
+      <table className="num">
+        <tbody>
+          {names.map((name) => (
+            <tr key={name}>
+              <th scope="row">{name}</th>
+              <td>{short(first![name])}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    );
+  }
+  return (
+    <table className="num">
+      <thead>
+        <tr>
+          {names.map((name) => (
+            <th key={name}>{name}</th>
+          ))}
+        </tr>
+      </thead>
+      <tbody>
+        {rows.slice(0, 20).map((row, index) => (
+          <tr key={`${index}`}>
+            {names.map((name) => (
+              <td key={name}>{short((row as Record<string, Data>)[name])}</td>
+            ))}
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}

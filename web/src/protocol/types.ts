@@ -1,0 +1,352 @@
+/** What the studio sends, as in docs/howto/studio.md. The page shows these records and computes none of them. */
+
+export type PortKind = "input" | "output" | "slot" | "event" | "parameter" | "timeout";
+export type Data = null | boolean | number | string | Data[] | { [name: string]: Data };
+
+export interface PortRecord {
+  name: string;
+  kind: PortKind;
+  path: string;
+  type: string;
+  optional?: boolean;
+  auto?: boolean;
+  used?: boolean;
+}
+
+export interface NodeRecord {
+  path: string;
+  name: string;
+  level: string;
+  type: string;
+  title: string;
+  group: string;
+  own_group: string | null;
+  options: Record<string, Data>;
+  parameters: Record<string, Data>;
+  locked: Record<string, string>;
+  shown: string[];
+  enabled: boolean;
+  subgraph: boolean;
+  unnamed?: boolean;
+  inside: number;
+  ports: PortRecord[];
+  missing: string;
+  activity: boolean;
+  notes: Record<string, Data>;
+}
+
+export interface EdgeRecord {
+  source: string;
+  target: string;
+  level: string;
+  active: boolean;
+  options: Record<string, Data>;
+  signal: boolean;
+  through: Data[];
+  back: boolean;
+}
+
+export interface GateRecord {
+  target: string;
+  by: string;
+  idle_rate_hz: number | null;
+  level: string;
+}
+
+export interface GroupRecord {
+  name: string;
+  threads: number | null;
+  policy: string;
+  process: string | null;
+  host: string | null;
+  number: number;
+}
+
+export interface Limits {
+  gt?: number;
+  ge?: number;
+  lt?: number;
+  le?: number;
+  multiple_of?: number;
+  min_length?: number;
+  max_length?: number;
+  predicate?: string;
+}
+
+export interface ParameterType {
+  name: string;
+  kind: string;
+  type: string;
+  doc: string;
+  default: Data;
+  required: boolean;
+  limits: Limits | null;
+  low: number | null;
+  high: number | null;
+  choices: Data[] | null;
+  labels: string[] | null;
+  unit: string;
+  step: number | null;
+  group: string;
+  read_only: boolean;
+  [more: string]: unknown;
+}
+
+export interface TypeRecord {
+  reference: string;
+  title: string;
+  category: string;
+  summary: string;
+  doc: string;
+  subgraph: boolean;
+  source: string;
+  parameters: ParameterType[];
+  ports: Record<string, string>;
+}
+
+export type Point = [number, number];
+
+export interface PortSpot {
+  kind: PortKind;
+  name: string;
+  x: number;
+  y: number;
+  says: string;
+}
+
+export interface LayoutBadge {
+  kind: "gate" | "timeout";
+  says: string;
+  by: string;
+}
+
+export interface NodeBox {
+  id: string;
+  name: string;
+  kind: "node" | "subgraph" | "feed";
+  type_name: string;
+  group: string;
+  x: number;
+  y: number;
+  width: number;
+  height: number;
+  row: number | null;
+  lane: number;
+  is_state: boolean;
+  is_active: boolean;
+  is_enabled: boolean;
+  is_open: boolean;
+  inner: number;
+  details: string[];
+  badges: LayoutBadge[];
+  ports: PortSpot[];
+}
+
+export interface LayoutTag {
+  text: string;
+  ports: string[];
+  kind: "input" | "output" | "slot" | "event" | "start" | "stop" | "parameter";
+  x: number;
+  y: number;
+  width: number;
+  height: number;
+}
+
+export interface LayoutLine {
+  edges: { source: string; target: string; label: string }[];
+  kind: "data" | "signal";
+  is_active: boolean;
+  is_back: boolean;
+  points: Point[];
+  combs: Point[][];
+  dots: Point[];
+  count_at: Point | null;
+  says: string;
+  says_at: Point | null;
+  tag: LayoutTag | null;
+}
+
+export interface LayoutRecord {
+  level: string;
+  title: string;
+  view: "activity" | "mission" | "all";
+  width: number;
+  height: number;
+  nodes: NodeBox[];
+  lines: LayoutLine[];
+  groups: string[];
+  hidden: number;
+  fixed?: string[];
+}
+
+export interface ProblemRecord {
+  path: string;
+  severity: "error" | "warning" | "hint";
+  what: string;
+  why: string;
+  remedy: string;
+  check: string;
+  source: "check" | "run" | "file";
+  at_s: number | null;
+  seen: boolean;
+  fixes: { text: string; message: Message }[];
+}
+
+export interface BreakpointRecord {
+  path: string;
+  hits: number;
+  holds: boolean;
+  condition: string;
+}
+
+export interface RunRecord {
+  state: "rest" | "starting" | "running" | "paused" | "stepping" | "ended";
+  outcome: string;
+  elapsed_s: number;
+  at: number;
+  why: string;
+  error: { message: string; path: string; what: string; remedy: string; traceback: string } | null;
+  number: number;
+  steerable: boolean;
+  clock: string;
+}
+
+export interface HistoryStep {
+  n: number;
+  text: string;
+  by: number;
+  at: number;
+}
+
+export interface HistoryRecord {
+  done: HistoryStep[];
+  undone: HistoryStep[];
+  saved: number;
+}
+
+export interface FileRecord {
+  name: string;
+  path: string;
+  folder: string;
+  kind: "yaml" | "python" | "none";
+  changes: number;
+  can_save: boolean | string;
+  elsewhere: string;
+  journal: { changes: number; at: number } | null;
+}
+
+export interface Tables {
+  nodes: Record<string, NodeRecord>;
+  edges: Record<string, EdgeRecord>;
+  gates: Record<string, GateRecord>;
+  groups: Record<string, GroupRecord>;
+  ports: Record<string, PortRecord>;
+  types: Record<string, TypeRecord>;
+  layouts: Record<string, LayoutRecord>;
+  problems: Record<string, ProblemRecord>;
+  breakpoints: Record<string, BreakpointRecord>;
+  studio: { run?: RunRecord; history?: HistoryRecord; file?: FileRecord; viewers?: { count: number } };
+}
+
+export interface Hello {
+  t: "hello";
+  v: number;
+  boot: string;
+  viewer: number;
+  name: string;
+  version: string;
+  read_only: string;
+  automatic: Record<string, { name: string; type: string }[]>;
+  topics: string[];
+  now: number;
+}
+
+export interface Reject {
+  t: "reject";
+  id: number;
+  code: string;
+  message: string;
+  path: string;
+  expected: string;
+  sent: string;
+  reason: string;
+  remedy: string;
+}
+
+export type Op = [table: string, key: string, record: unknown];
+
+export type FromStudio =
+  | Hello
+  | { t: "snapshot"; rev: number; tables: Partial<Tables> }
+  | { t: "patch"; rev: number; ops: Op[]; by: number; text: string }
+  | { t: "ack"; id: number; rev: number }
+  | { t: "answer"; id: number; value: unknown }
+  | Reject
+  | { t: "data"; sub: number; seq: number; time: number; value: unknown }
+  | { t: "gone"; sub: number; message: string };
+
+export type Message = { t: string; [field: string]: unknown };
+export type Command = { do: string; [field: string]: Data | undefined };
+
+export interface Fit {
+  fit: "expects" | "takes" | "refused";
+  expected: string;
+  sent: string;
+  reason: string;
+  remedy: string;
+  message: string;
+}
+
+export interface Targets {
+  sends: string;
+  counts: { expects: number; takes: number; refuses: number };
+  ports: Record<string, Fit>;
+}
+
+export interface FoundRow {
+  reference: string;
+  title: string;
+  name: string;
+  category: string;
+  summary: string;
+  fit: "expects" | "takes" | "refused" | "";
+  port: string;
+  message: string;
+}
+
+export interface Found {
+  rows: FoundRow[];
+  near: string[];
+  total: number;
+  refused: number;
+}
+
+export interface Value {
+  time: number;
+  stamp: number | null;
+  number: number;
+  activity: boolean;
+  kind: "number" | "text" | "image" | "array" | "table" | "record" | "marker" | "none" | "other";
+  summary: string;
+  data: Data;
+  shape: number[] | null;
+  dtype: string;
+  rate_hz: number;
+  seen: number;
+  message: string;
+}
+
+export interface NodeMeasures {
+  waiting: Record<string, number>;
+  doing: string;
+  p50_s: number | null;
+  p99_s: number | null;
+  max_s: number | null;
+  rate_hz: number;
+  firings: number;
+  calls: number;
+  failed: number;
+  queued: number;
+  active_share: number;
+  busy_share: number;
+}

@@ -1,0 +1,38 @@
+import { chosen, locked, pauseOrGo, step, tell } from "../state/actions";
+import { useStudio } from "../state/studio";
+import { Icon } from "../ui/Icon";
+
+/** Pause and go on, a wave, a firing, stop: in the middle of the bar, where they stay in the narrowest window. */
+export function RunControl() {
+  const state = useStudio((s) => s.tables.studio.run?.state ?? "rest");
+  const one = useStudio((s) => (s.selection.size === 1 ? [...s.selection][0]! : ""));
+  useStudio((s) => s.age === 3); // the buttons lock with the edits
+  const why = locked();
+  const moves = state === "running" || state === "starting" || state === "stepping";
+  const at_rest = state === "rest" || state === "ended";
+  const goes = moves ? "Pause (Space)" : at_rest ? "Start (Space)" : "Go on (Space)";
+  const off = why !== "";
+  return (
+    <span className="group" role="group" aria-label="Run" title={why || undefined}>
+      <button type="button" className="btn" title={why || goes} aria-label={goes} disabled={off} onClick={pauseOrGo}>
+        <Icon name={moves ? "pause" : "play"} />
+      </button>
+      <button type="button" className="btn" title="Step a wave (.)" aria-label="Step a wave" disabled={off || at_rest} onClick={() => void step("")}>
+        <Icon name="wave" />
+      </button>
+      <button
+        type="button"
+        className="btn"
+        title="Step a firing of the selected node (,)"
+        aria-label="Step a firing of the selected node"
+        disabled={off || at_rest || one === ""}
+        onClick={() => void step(chosen()[0] ?? "")}
+      >
+        <Icon name="step" />
+      </button>
+      <button type="button" className="btn" title="Stop (Shift+Esc)" aria-label="Stop" disabled={off || at_rest} onClick={() => void tell("stop")}>
+        <Icon name="stop" />
+      </button>
+    </span>
+  );
+}

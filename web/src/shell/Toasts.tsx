@@ -1,0 +1,76 @@
+import { dropToast } from "../state/actions";
+import { socket } from "../state/link";
+import { useStudio, type Toast } from "../state/studio";
+import { Icon } from "../ui/Icon";
+import { moment } from "../ui/words";
+
+export function Toasts() {
+  const toasts = useStudio((s) => s.toasts);
+  return (
+    <div className="toasts" role="status">
+      <Away />
+      {toasts.map((one) => (
+        <OneToast key={one.id} toast={one} />
+      ))}
+    </div>
+  );
+}
+
+function OneToast({ toast }: { toast: Toast }) {
+  return (
+    <div className={`pop toast grows ${toast.kind === "bad" ? "bad" : ""}`} role={toast.kind === "bad" ? "alert" : undefined}>
+      {toast.kind !== "plain" && (
+        <span style={{ color: toast.kind === "bad" ? "var(--bad)" : "var(--warn)" }}>
+          <Icon name="error" />
+        </span>
+      )}
+      <span>
+        {toast.title !== "" && <b>{toast.title} </b>}
+        {toast.text}
+      </span>
+      {toast.action && (
+        <button type="button" className="btn line" onClick={toast.action.act}>
+          {toast.action.label}
+        </button>
+      )}
+      <button type="button" className="btn" aria-label="Close" onClick={() => dropToast(toast.id)}>
+        <Icon name="close" />
+      </button>
+    </div>
+  );
+}
+
+/** The page says what it does not know. */
+function Away() {
+  const age = useStudio((s) => s.age);
+  const seconds = useStudio((s) => s.ageSeconds);
+  const phase = useStudio((s) => s.phase);
+  const why = useStudio((s) => s.closedWhy);
+  const run = useStudio((s) => s.tables.studio.run);
+  if (phase === "refused") {
+    return (
+      <div className="pop toast bad" role="alert">
+        <span style={{ color: "var(--bad)" }}>
+          <Icon name="error" />
+        </span>
+        <span>
+          <b>The studio does not let this page in.</b> {why || "Open the address that hfg studio has printed; it has the token."}
+        </span>
+      </div>
+    );
+  }
+  if (age < 3) return null;
+  return (
+    <div className="pop toast" role="alert">
+      <span style={{ color: "var(--warn)" }}>
+        <Icon name="error" />
+      </span>
+      <span>
+        <b>No word from the studio for {seconds} s.</b> {run ? `You see how it was at ${moment(run.elapsed_s)}. ` : ""}Edits wait until it answers.
+      </span>
+      <button type="button" className="btn line" onClick={() => socket.connect()}>
+        Try now
+      </button>
+    </div>
+  );
+}

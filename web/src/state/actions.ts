@@ -1,0 +1,259 @@
+import { Refusal } from "../protocol/socket";
+import type { Command, Data, FoundRow, Message } from "../protocol/types";
+import { socket, showLevel } from "./link";
+import { edgeKey, endsOf, isInside, joined, nameOf, parentOf } from "./paths";
+import { change, studio, type Toast, type View } from "./studio";
+
+let toasts = 0;
+let gestures = 0;
+
+export const newGesture = (): string => `${studio().hello?.viewer ?? 0}-${++gestures}`;
+
+export function toast(text: string, more: Partial<Omit<Toast, "id" | "text">> = {}, lasts = 6000): void {
+  const one: Toast = { id: ++toasts, kind: "plain", title: "", ...more, text };
+  const others = studio().toasts.filter((other) => other.text !== text).slice(-2);
+  change({ toasts: [...others, one] });
+  if (lasts > 0) setTimeout(() => dropToast(one.id), lasts);
+}
+
+export function dropToast(id: number): void {
+  change({ toasts: studio().toasts.filter((one) => one.id !== id) });
+}
+
+/** Sends a request; a refusal is said in the studio's own words. */
+export async function ask<T = unknown>(message: Message): Promise<T | null> {
+  try {
+    return (await socket.request(message)) as T;
+  } catch (error) {
+    const words = error instanceof Error ? error.message : String(error);
+    toast(words, { kind: error instanceof Refusal ? "bad" : "warn" });
+    return null;
+  }
+}
+
+export const question = <T>(what: string, args: Record<string, unknown>): Promise<T> =>
+  socket.request({ t: "ask", what, args }) as Promise<T>;
+
+export const tell = (t: string, fields: Record<string, unknown> = {}): Promise<unknown> => ask({ t, ...fields });
+
+export async function edit(commands: Command[], gesture = ""): Promise<boolean> {
+  if (commands.length === 0) return true;
+  return (await ask({ t: "edit", commands, gesture })) !== null;
+}
+
+export async function undo(): Promise<void> {
+  const last = studio().tables.studio.history?.done.at(-1);
+  if ((await tell("undo")) !== null && last) toast(`Undone: ${last.text}`, {}, 2000);
+}
+
+export async function redo(): Promise<void> {
+  const last = studio().tables.studio.history?.undone.at(-1);
+  if ((await tell("redo")) !== null && last) toast(`Done again: ${last.text}`, {}, 2000);
+}
+
+// --- where the person looks ---
+
+export function enter(path: string): void {
+  if (path === studio().level) return;
+  change({ level: path, selectedEdge: null, menu: null });
+  showLevel();
+}
+
+export function leave(): void {
+  const { level } = studio();
+  if (level === "") return;
+  enter(parentOf(level));
+  select([level]);
+}
+
+export function choose(view: View): void {
+  const { level, views } = studio();
+  change({ views: { ...views, [level]: view } });
+  showLevel();
+}
+
+export function select(paths: Iterable<string>): void {
+  change({ selection: new Set(paths), selectedEdge: null });
+}
+
+/** Goes to where a node is, and selects it. */
+export function show(path: string): void {
+  if (!(path in studio().tables.nodes)) return;
+  enter(parentOf(path));
+  select([path]);
+  window.dispatchEvent(new CustomEvent("hfg-show", { detail: path }));
+}
+
+export const chosen = (): string[] => [...studio().selection];
+
+/** Whether nothing may be changed now, and why. */
+export function locked(): string {
+  const { hello, age, phase } = studio();
+  if (hello?.read_only) return hello.read_only;
+  if (age === 3 || phase === "closed") return "Edits wait until the studio answers.";
+  return "";
+}
+
+// --- edits ---
+
+export async function addNode(row: Pick<FoundRow, "reference" | "name" | "port" | "title">, at: { x: number; y: number }, wire: string) {
+  const { level } = studio();
+  const free = await question<{ name: string }>("free_name", { level, name: row.name || row.title });
+  const path = joined(level, free.name);
+  const commands: Command[] = [
+    { do: "Add", type: row.reference, path },
+    { do: "Note", path, name: "position", value: [Math.round(at.x / 8) * 8, Math.round(at.y / 8) * 8] },
+  ];
+  if (wire !== "" && row.port !== "") {
+    const port = `${path}.${row.port.split("/").at(-1) ?? row.port}`;
+    const [source, target] = isSource(wire) ? [wire, port] : [port, wire];
+    commands.push({ do: "Connect", source, target });
+  }
+  if (await edit(commands)) select([path]);
+}
+
+/** Whether edges begin at a port, seen from the level that the page shows. */
+export function isSource(port: string): boolean {
+  const inner = port.endsWith(".inner");
+  const plain = inner ? port.slice(0, -6) : port;
+  const record = studio().tables.nodes[plain.slice(0, plain.indexOf(".", plain.lastIndexOf("/") + 1))];
+  const kind = record?.ports.find((one) => one.path === plain)?.kind ?? "event";
+  const out = kind === "output" || kind === "event";
+  return inner ? !out : out;
+}
+
+export const connect = (source: string, target: string, active: boolean): Promise<boolean> =>
+  edit([active ? { do: "Connect", source, target, active } : { do: "Connect", source, target }]);
+
+export const disconnect = (edge: string): Promise<boolean> => {
+  const [source, target] = endsOf(edge);
+  return edit([{ do: "Disconnect", source, target }]);
+};
+
+export async function reconnect(edge: string, source: string, target: string): Promise<boolean> {
+  const { tables } = studio();
+  const [from, to] = endsOf(edge);
+  if (edgeKey(source, target) === edge) return true;
+  const active = tables.edges[edge]?.active ?? false;
+  const options = tables.edges[edge]?.options ?? {};
+  const connect: Command = { do: "Connect", source, target, ...options };
+  if (active) connect.active = true;
+  return edit([{ do: "Disconnect", source: from, target: to }, connect]);
+}
+
+export async function remove(paths: string[]): Promise<void> {
+  const edge = studio().selectedEdge;
+  if (paths.length === 0 && edge) {
+    if (await disconnect(edge)) change({ selectedEdge: null });
+    return;
+  }
+  const outer = paths.filter((path) => !paths.some((other) => other !== path && isInside(path, other)));
+  await edit(outer.map((path) => ({ do: "Remove", path })));
+}
+
+/** Removes a node and joins what led to it with what came from it, where there is exactly one of each. */
+export async function dissolveNode(path: string): Promise<void> {
+  const edges = Object.values(studio().tables.edges);
+  const into = edges.filter((edge) => edge.target.startsWith(`${path}.`));
+  const from = edges.filter((edge) => edge.source.startsWith(`${path}.`));
+  const commands: Command[] = [{ do: "Remove", path }];
+  for (const before of into.slice(0, 1)) {
+    for (const after of from) {
+      const active = before.active && after.active;
+      commands.push({ do: "Connect", source: before.source, target: after.target, ...(active ? { active } : {}) });
+    }
+  }
+  await edit(commands);
+}
+
+export async function insertOn(edge: string, path: string, input: string, output: string): Promise<boolean> {
+  const [source, target] = endsOf(edge);
+  return edit([
+    { do: "Disconnect", source, target },
+    { do: "Connect", source, target: `${path}.${input}` },
+    { do: "Connect", source: `${path}.${output}`, target },
+  ]);
+}
+
+export async function rename(path: string, name: string): Promise<void> {
+  change({ renaming: null });
+  if (name === "" || name === nameOf(path)) return;
+  if (await edit([{ do: "Rename", path, name }])) {
+    select([joined(parentOf(path), name)]);
+  }
+}
+
+export const setParameter = (path: string, value: Data, gesture: string): Promise<boolean> =>
+  edit([{ do: "SetParameter", path, value }], gesture);
+
+export async function toggleEnabled(paths: string[]): Promise<void> {
+  const { nodes } = studio().tables;
+  const on = paths.some((path) => !nodes[path]?.enabled);
+  await edit(paths.map((path) => ({ do: on ? "Enable" : "Disable", path })));
+}
+
+export async function enclose(paths: string[]): Promise<void> {
+  if (paths.length === 0) return;
+  const { level } = studio();
+  const { name } = await question<{ name: string }>("free_name", { level, name: "group" });
+  if (await edit([{ do: "Enclose", paths, name }])) select([joined(level, name)]);
+}
+
+export const dissolve = (paths: string[]): Promise<boolean> => {
+  const { nodes } = studio().tables;
+  return edit(paths.filter((path) => nodes[path]?.subgraph).map((path) => ({ do: "Dissolve", path })));
+};
+
+export async function makeActive(edge: string): Promise<void> {
+  const [source, target] = endsOf(edge);
+  const active = !studio().tables.edges[edge]?.active;
+  await edit([{ do: "MakeActive", source, target, active }]);
+}
+
+export async function copyAsText(paths: string[]): Promise<string> {
+  const text = await question<string | { text: string }>("text", { paths });
+  return typeof text === "string" ? text : text.text;
+}
+
+export async function pasteText(text: string): Promise<void> {
+  const { level, tables } = studio();
+  const before = new Set(Object.keys(tables.nodes));
+  try {
+    const { commands } = await question<{ commands: Command[] }>("paste", { text, level });
+    if (!(await edit(commands))) return;
+    const added = commands.flatMap((one) => (typeof one.path === "string" && /^Add/.test(one.do) ? [one.path] : []));
+    select(added.filter((path) => !before.has(path) && parentOf(path) === level));
+  } catch (error) {
+    toast(error instanceof Error ? error.message : String(error), { kind: "bad" });
+  }
+}
+
+export async function toggleBreak(path: string): Promise<void> {
+  const set = path in studio().tables.breakpoints;
+  await tell(set ? "unbreak" : "break", set ? { path } : { path, condition: null });
+}
+
+export const arrange = (paths: string[] | null): Promise<unknown> => tell("arrange", { level: studio().level, paths });
+
+export function pin(path: string): void {
+  const { pins } = studio();
+  change({ pins: pins.includes(path) ? pins.filter((one) => one !== path) : [...pins, path], side: true });
+}
+
+// --- the run ---
+
+export function pauseOrGo(): void {
+  const state = studio().tables.studio.run?.state ?? "rest";
+  if (state === "running" || state === "starting" || state === "stepping") void tell("pause");
+  else if (state === "paused") void tell("proceed");
+  else void tell("start", { stay: true });
+}
+
+export async function step(path: string): Promise<void> {
+  const answer = await ask<{ moved: string[]; why_not?: string }>({ t: "step", path });
+  if (answer?.why_not) toast(answer.why_not);
+}
+
+export async function save(path = "", force = false): Promise<void> {
+  if ((await tell("save", { path, force })) !== null) toast(`Saved as ${path || studio().tables.studio.file?.name || "the file"}`, {}, 2000);
+}

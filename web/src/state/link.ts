@@ -1,0 +1,82 @@
+import { Socket } from "../protocol/socket";
+import type { FromStudio } from "../protocol/types";
+import { applied, fromSnapshot } from "./replica";
+import { change, layoutKey, studio } from "./studio";
+
+/** The page's end of the socket: what arrives goes into the state. */
+export const socket = new Socket(address(), {
+  hello(hello) {
+    change({ hello, clockOffset: hello.now - Date.now() / 1000 });
+    if (hello.name) document.title = `${hello.name} · hfg studio`;
+  },
+  message: heard,
+  opened() {
+    change({ phase: "open", age: 0, ageSeconds: 0, wire: null });
+    opened = null;
+    showLevel();
+  },
+  closed(code, reason) {
+    const state = studio();
+    const closedAt = state.phase === "closed" ? state.closedAt : performance.now();
+    change({ phase: code === 4401 || code === 1008 ? "refused" : "closed", closedWhy: reason, closedAt, wire: null });
+  },
+  known() {
+    const { hello, rev } = studio();
+    return rev < 0 || hello === null ? null : { boot: boot ?? "", rev };
+  },
+});
+
+let boot: string | null = null;
+let opened: { path: string; view: string } | null = null;
+
+function address(): string {
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  return `${scheme}://${location.host}/ws`;
+}
+
+function heard(message: FromStudio): void {
+  if (message.t === "snapshot") {
+    boot = studio().hello?.boot ?? null;
+    change({ rev: message.rev, tables: fromSnapshot(message.tables) });
+    keepLevel();
+    showLevel();
+  } else if (message.t === "patch") {
+    const state = studio();
+    if (message.rev <= state.rev) return;
+    change({ rev: message.rev, tables: applied(state.tables, message.ops) });
+    keepLevel();
+  }
+}
+
+/** A level or a node that somebody has removed cannot stay on the screen. */
+function keepLevel(): void {
+  const { level, tables, selection } = studio();
+  if (level !== "" && !tables.nodes[level]?.subgraph) change({ level: level.slice(0, Math.max(0, level.lastIndexOf("/"))) });
+  const left = [...selection].filter((path) => path in tables.nodes);
+  if (left.length < selection.size) change({ selection: new Set(left) });
+}
+
+/** Tells the studio which level and view it is to lay out. */
+export function showLevel(): void {
+  const state = studio();
+  const wanted = { path: state.level, view: state.views[state.level] ?? "" };
+  if (opened && opened.path === wanted.path && opened.view === wanted.view) return;
+  if (opened) socket.send({ t: "level", ...opened, open: false });
+  if (socket.send({ t: "level", ...wanted, open: true })) opened = wanted;
+}
+
+/** Old data looks old: after one second without a word the dot is grey, after three the picture is. */
+export function watchAge(): void {
+  setInterval(() => {
+    const state = studio();
+    const running = ["running", "starting"].includes(state.tables.studio.run?.state ?? "");
+    const since = state.phase === "closed" ? state.closedAt : socket.lastWord;
+    const quiet = state.phase === "closed" || (state.phase === "open" && running);
+    const seconds = quiet ? (performance.now() - since) / 1000 : 0;
+    const age = seconds >= 3 ? 3 : seconds >= 1 ? 1 : 0;
+    const ageSeconds = Math.floor(seconds);
+    if (age !== state.age || (age > 0 && ageSeconds !== state.ageSeconds)) change({ age, ageSeconds });
+  }, 250);
+}
+
+export { layoutKey };

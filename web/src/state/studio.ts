@@ -1,0 +1,117 @@
+import { create } from "zustand";
+import type { Hello, Tables, Targets } from "../protocol/types";
+import { EMPTY } from "./replica";
+
+export type View = "activity" | "mission" | "all";
+export type Tab = "timeline" | "problems" | "log" | "history";
+export type Panel = "outline" | null;
+export type Popover = "palette" | "commands" | "keys" | "tour" | "open" | null;
+
+export interface Toast {
+  id: number;
+  kind: "plain" | "bad" | "warn";
+  title: string;
+  text: string;
+  action?: { label: string; act: () => void };
+}
+
+export interface PaletteAt {
+  /** Where on the screen it opens, and the place in the graph that it adds to. */
+  screen: { x: number; y: number };
+  place: { x: number; y: number };
+  port: string;
+  words: string;
+}
+
+export interface WireDrag {
+  from: string;
+  moving: string;
+  targets: Targets | null;
+  over: string | null;
+  point: { x: number; y: number };
+  screen: { x: number; y: number };
+  active: boolean;
+}
+
+export interface Activity {
+  /** When each active node became so, in seconds of the run. */
+  since: Readonly<Record<string, number>>;
+  /** Edges over which the activity came last. */
+  ways: ReadonlySet<string>;
+}
+
+export interface Studio {
+  phase: "connecting" | "open" | "closed" | "refused";
+  closedWhy: string;
+  closedAt: number;
+  hello: Hello | null;
+  clockOffset: number;
+  rev: number;
+  tables: Tables;
+  level: string;
+  views: Readonly<Record<string, View>>;
+  selection: ReadonlySet<string>;
+  selectedEdge: string | null;
+  activity: Activity;
+  age: 0 | 1 | 3;
+  ageSeconds: number;
+  theme: "light" | "dark";
+  tab: Tab;
+  panel: Panel;
+  popover: Popover;
+  palette: PaletteAt | null;
+  menu: { x: number; y: number; path: string; kind: "node" | "edge" | "canvas" } | null;
+  wire: WireDrag | null;
+  renaming: string | null;
+  side: boolean;
+  time: boolean;
+  pins: readonly string[];
+  toasts: readonly Toast[];
+  announced: string;
+  editedAt: string | null;
+}
+
+const media = window.matchMedia("(prefers-color-scheme: dark)");
+
+function firstTheme(): "light" | "dark" {
+  const kept = localStorage.getItem("hfg-theme");
+  if (kept === "light" || kept === "dark") return kept;
+  return media.matches ? "dark" : "light";
+}
+
+export const useStudio = create<Studio>()(() => ({
+  phase: "connecting",
+  closedWhy: "",
+  closedAt: 0,
+  hello: null,
+  clockOffset: 0,
+  rev: -1,
+  tables: EMPTY,
+  level: "",
+  views: {},
+  selection: new Set<string>(),
+  selectedEdge: null,
+  activity: { since: {}, ways: new Set<string>() },
+  age: 0,
+  ageSeconds: 0,
+  theme: firstTheme(),
+  tab: "timeline",
+  panel: null,
+  popover: null,
+  palette: null,
+  menu: null,
+  wire: null,
+  renaming: null,
+  side: window.innerWidth > 1100,
+  time: true,
+  pins: [],
+  toasts: [],
+  announced: "",
+  editedAt: null,
+}));
+
+export const studio = useStudio.getState;
+export const change = useStudio.setState;
+
+/** The layout that the page shows: that of the chosen view, or of the level's own. */
+export const layoutKey = (state: Studio): string => `${state.views[state.level] ?? ""}:${state.level}`;

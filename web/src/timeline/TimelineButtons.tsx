@@ -1,0 +1,64 @@
+import { Icon } from "../ui/Icon";
+import { record, useWindow } from "./store";
+
+const LENGTHS = [0.3, 1, 3, 14, 60, 300];
+
+export function TimelineButtons() {
+  const { follows, length } = useWindow();
+  const label = length >= 2 ? `last ${Math.round(length)} s` : `last ${Math.round(length * 1000)} ms`;
+  const toggle = () => useWindow.setState({ follows: !follows, end: record.now });
+  return (
+    <>
+      <button
+        type="button"
+        className="btn small line"
+        aria-pressed={follows}
+        style={follows ? { color: "var(--you)", borderColor: "var(--you)" } : undefined}
+        title="Follow live (L)"
+        onClick={toggle}
+      >
+        <Icon name="follow" />
+        {follows ? "Follows" : "Follow"}
+      </button>
+      <label className="btn small hide-n">
+        <select
+          aria-label="Length of the window"
+          value={LENGTHS.includes(length) ? length : ""}
+          onChange={(event) => useWindow.setState({ length: Number(event.target.value) })}
+          style={{ border: 0, background: "none" }}
+        >
+          {!LENGTHS.includes(length) && <option value="">{label}</option>}
+          {LENGTHS.map((one) => (
+            <option key={one} value={one}>
+              {one >= 2 ? `last ${one} s` : `last ${one * 1000} ms`}
+            </option>
+          ))}
+        </select>
+      </label>
+      <button type="button" className="btn small hide-n" onClick={savePerfetto} title="Open the file at ui.perfetto.dev or in Chrome">
+        Save as Perfetto
+      </button>
+    </>
+  );
+}
+
+/** The boxes that the page has, in the trace format of Chrome and Perfetto. */
+function savePerfetto(): void {
+  const lanes = [...new Set(record.boxes.map((box) => box[1]))];
+  const events = record.boxes.map(([node, group, begin, end, kind]) => ({
+    name: node,
+    cat: kind,
+    ph: "X",
+    ts: begin * 1e6,
+    dur: (end - begin) * 1e6,
+    pid: 1,
+    tid: lanes.indexOf(group) + 1,
+  }));
+  const names = lanes.map((name, index) => ({ name: "thread_name", ph: "M", pid: 1, tid: index + 1, args: { name } }));
+  const blob = new Blob([JSON.stringify({ traceEvents: [...names, ...events] })], { type: "application/json" });
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = "timeline.json";
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}

@@ -1,0 +1,201 @@
+import { groupClass } from "../state/looking";
+import { isInside, nameOf } from "../state/paths";
+import { studio } from "../state/studio";
+import { colour } from "../ui/colours";
+import { percent } from "../ui/words";
+import { icicle, type Piece, steps, tickStep, withoutCommon } from "./icicle";
+import { type Box, record, useWindow } from "./store";
+
+export const GUTTER = 136;
+const RIGHT = 12;
+const ROW = 17;
+const LANE = 19;
+const TOP = 42;
+const LANES = TOP + 3 * ROW + 4;
+const SLOWEST_S = 0.006;
+
+interface Target {
+  x: number;
+  y: number;
+  width: number;
+  height: number;
+  path: string;
+}
+
+/** What can be clicked, in the places where it was drawn last. */
+export let targets: Target[] = [];
+export let scale = { begin: 0, length: 1, width: 1 };
+
+export const timeAt = (x: number): number => scale.begin + ((x - GUTTER) / (scale.width - GUTTER - RIGHT)) * scale.length;
+export const overviewTimeAt = (x: number): number => ((x - GUTTER) / (scale.width - GUTTER - RIGHT)) * record.now;
+
+export function drawTimeline(canvas: HTMLCanvasElement): void {
+  const context = canvas.getContext("2d");
+  if (!context) return;
+  const ratio = window.devicePixelRatio || 1;
+  const width = canvas.clientWidth;
+  const height = canvas.clientHeight;
+  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+  }
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  const { follows, length, end } = useWindow.getState();
+  const right = follows ? Math.max(record.now, length) : end;
+  scale = { begin: right - length, length, width };
+  targets = [];
+  new Drawing(context, width, height).all();
+}
+
+class Drawing {
+  private readonly selection = studio().selection;
+
+  constructor(
+    private readonly c: CanvasRenderingContext2D,
+    private readonly width: number,
+    private readonly height: number,
+  ) {}
+
+  all(): void {
+    this.c.fillStyle = colour("surface");
+    this.c.fillRect(0, 0, this.width, this.height);
+    this.c.textBaseline = "middle";
+    const { spans, prefix } = withoutCommon(record.spans);
+    this.overview(steps(spans, record.now), prefix);
+    this.axis();
+    this.activity(icicle(spans, scale.begin, record.now), prefix);
+    if (this.height > 110) this.lanes();
+    this.playhead();
+  }
+
+  private x(time: number): number {
+    return GUTTER + ((time - scale.begin) / scale.length) * (this.width - GUTTER - RIGHT);
+  }
+
+  private text(words: string, x: number, y: number, token: string, weight = 450, size = 11): void {
+    this.c.font = `${weight} ${size}px ${colour("font")}`;
+    this.c.fillStyle = colour(token);
+    this.c.fillText(words, x, y);
+  }
+
+  private fits(words: string, width: number): boolean {
+    return this.c.measureText(words).width + 8 < width;
+  }
+
+  private overview(pieces: Piece[], prefix: string): void {
+    this.text("whole run", 12, 14, "ink3");
+    const whole = Math.max(record.now, 1e-6);
+    const room = this.width - GUTTER - RIGHT;
+    const at = (time: number) => GUTTER + (Math.min(time, whole) / whole) * room;
+    this.c.fillStyle = colour("surface2");
+    this.c.fillRect(GUTTER, 6, room, 16);
+    for (const step of pieces) {
+      const left = at(step.begin);
+      const wide = Math.max(1.5, at(step.end) - left);
+      this.c.fillStyle = colour(step.now ? "on" : "line2");
+      this.c.fillRect(left, 6, Math.max(1, wide - 1), 16);
+      this.c.font = `500 11px ${colour("font")}`;
+      if (this.fits(step.name, wide)) this.text(step.name, left + 4, 14.5, step.now ? "on-text" : "ink", 500);
+      targets.push({ x: left, y: 6, width: wide, height: 16, path: full(prefix, step.path) });
+    }
+    this.c.strokeStyle = colour("you");
+    this.c.lineWidth = 2;
+    const left = at(Math.max(0, scale.begin));
+    this.c.strokeRect(left, 4, Math.max(2, at(scale.begin + scale.length) - left), 20);
+    this.c.lineWidth = 1;
+  }
+
+  private axis(): void {
+    const step = tickStep(scale.length);
+    const places = step < 0.1 ? 2 : step < 1 ? 1 : 0;
+    for (let index = Math.ceil(scale.begin / step); index * step <= scale.begin + scale.length; index++) {
+      const x = Math.round(this.x(index * step));
+      this.c.fillStyle = colour("line");
+      this.c.fillRect(x, TOP, 1, this.height - TOP);
+      if (index % 2 === 0 && index >= 0) this.text(`${(index * step).toFixed(places)} s`, x + 4, 34, "ink3");
+    }
+  }
+
+  private activity(rows: Piece[][], prefix: string): void {
+    this.text("activity", 12, TOP + 9, "ink2", 600);
+    rows.forEach((pieces, row) => {
+      for (const piece of pieces) this.piece(piece, TOP + row * ROW, full(prefix, piece.path));
+    });
+  }
+
+  private piece(piece: Piece, y: number, path: string): void {
+    const left = Math.max(GUTTER, this.x(piece.begin));
+    const right = Math.min(this.width - RIGHT, this.x(piece.end));
+    if (right < GUTTER || left > this.width - RIGHT) return;
+    const wide = Math.max(2, right - left - 1);
+    this.c.fillStyle = colour(piece.now ? "on-soft" : "surface2");
+    this.c.fillRect(left, y, wide, ROW - 2);
+    this.c.strokeStyle = colour(piece.now ? "on" : "line2");
+    if (wide > 3) this.c.strokeRect(left + 0.5, y + 0.5, wide - 1, ROW - 3);
+    if (this.isChosen(path)) this.ring(left, y, wide, ROW - 2);
+    this.c.font = `${piece.now ? 600 : 450} 11px ${colour("font")}`;
+    if (this.fits(piece.name, wide)) this.text(piece.name, left + 5, y + 9, piece.now ? "on-ink" : "ink2", piece.now ? 600 : 450);
+    targets.push({ x: left, y, width: wide, height: ROW - 2, path });
+  }
+
+  private lanes(): void {
+    const tables = studio().tables;
+    const groups = Object.values(tables.groups).sort((a, b) => a.number - b.number);
+    const rows = new Map(groups.map((group, index) => [group.name, LANES + index * LANE]));
+    for (const group of groups) {
+      const y = rows.get(group.name)!;
+      this.c.fillStyle = colour(groupClass(tables, group.name).split(" ")[0] || "loop");
+      this.c.fillRect(12, y + 5, 8, 8);
+      this.text(group.name, 26, y + 9.5, "ink2", 600);
+      this.c.textAlign = "right";
+      this.text(percent(record.loads.get(group.name) ?? 0), GUTTER - 8, y + 9.5, "ink3");
+      this.c.textAlign = "left";
+      this.c.fillStyle = colour("line");
+      this.c.fillRect(GUTTER, y + 15, this.width - GUTTER - RIGHT, 1);
+    }
+    for (let index = record.boxes.length - 1; index >= 0; index--) {
+      const box = record.boxes[index]!;
+      if (box[3] < scale.begin - 1) break;
+      const y = rows.get(box[1]);
+      if (y !== undefined) this.box(box, y, groupClass(tables, box[1]).split(" ")[0] || "loop");
+    }
+  }
+
+  private box([node, , begin, end]: Box, y: number, token: string): void {
+    if (end < scale.begin || begin > scale.begin + scale.length) return;
+    const left = Math.max(GUTTER, this.x(begin));
+    const wide = Math.max(1, this.x(end) - left);
+    const tall = scale.length < 3 ? 13 : Math.max(3, 13 * Math.min(1, Math.max(0.28, (end - begin) / SLOWEST_S)));
+    this.c.fillStyle = colour(token);
+    this.c.fillRect(left, y + 15 - tall, wide, tall);
+    if (this.isChosen(node)) this.ring(left, y + 1, wide, 13);
+    if (wide > 30) {
+      this.c.font = `500 10.5px ${colour("font")}`;
+      const name = nameOf(node);
+      if (this.fits(name, wide)) this.text(name, left + 3, y + 9, "surface", 500, 10.5);
+    }
+    if (wide >= 2) targets.push({ x: left, y: y + 2, width: wide, height: 13, path: node });
+  }
+
+  private isChosen(path: string): boolean {
+    if (this.selection.size === 0) return false;
+    return this.selection.has(path) || [...this.selection].some((one) => isInside(path, one));
+  }
+
+  private ring(x: number, y: number, width: number, height: number): void {
+    this.c.strokeStyle = colour("you");
+    this.c.lineWidth = 2;
+    this.c.strokeRect(x, y, width, height);
+    this.c.lineWidth = 1;
+  }
+
+  private playhead(): void {
+    const x = this.x(record.now);
+    if (x < GUTTER || x > this.width) return;
+    const active = Object.keys(studio().activity.since).length > 0;
+    this.c.fillStyle = colour(active ? "on" : "ink2");
+    this.c.fillRect(Math.min(x, this.width - RIGHT + 1) - 1, 28, 2, this.height - 28);
+  }
+}
+
+const full = (prefix: string, path: string): string => (prefix === "" ? path : `${prefix}/${path}`);

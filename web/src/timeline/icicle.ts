@@ -1,0 +1,63 @@
+import type { Span } from "./store";
+
+export interface Piece {
+  path: string;
+  name: string;
+  begin: number;
+  end: number;
+  now: boolean;
+}
+
+/** Spans closer than this are one: handing activity over takes no time that one could see. */
+const GAP_S = 0.05;
+
+/** Three rows: the step of the mission, what is inside of it, and the innermost, with the rest of its path. */
+export function icicle(spans: readonly Span[], from: number, now: number, rows = 3): Piece[][] {
+  const found: Piece[][] = Array.from({ length: rows }, () => []);
+  const sorted = [...spans].filter(([, , end]) => end === null || end >= from).sort((a, b) => a[1] - b[1]);
+  for (const [path, begin, end] of sorted) {
+    const parts = path.split("/");
+    parts.slice(0, rows).forEach((part, row) => {
+      const last = row === rows - 1;
+      if (last && parts.length > rows && row !== rows - 1) return;
+      const key = last ? path : parts.slice(0, row + 1).join("/");
+      const name = last && parts.length > rows ? parts.slice(rows - 1).join(" › ") : part;
+      const piece = { path: key, name, begin, end: end ?? now, now: end === null };
+      const before = found[row]!.at(-1);
+      if (before && before.path === key && begin - before.end < GAP_S) {
+        before.end = Math.max(before.end, piece.end);
+        before.now ||= piece.now;
+      } else found[row]!.push(piece);
+    });
+  }
+  return found;
+}
+
+/** The steps of the mission alone: the first names of the paths, one after the other. */
+export function steps(spans: readonly Span[], now: number): Piece[] {
+  const short = spans.map(([path, begin, end]): Span => [path.split("/")[0]!, begin, end]);
+  return icicle(short, 0, now, 1)[0]!;
+}
+
+/** Leaves out levels that all spans share, such as the only robot. */
+export function withoutCommon(spans: readonly Span[]): { spans: Span[]; prefix: string } {
+  let prefix = spans[0]?.[0].split("/").slice(0, -1) ?? [];
+  for (const [path] of spans) {
+    const parts = path.split("/").slice(0, -1);
+    let same = 0;
+    while (same < prefix.length && prefix[same] === parts[same]) same++;
+    prefix = prefix.slice(0, same);
+  }
+  const length = prefix.length === 0 ? 0 : prefix.join("/").length + 1;
+  return { spans: spans.map(([path, begin, end]) => [path.slice(length), begin, end]), prefix: prefix.join("/") };
+}
+
+export function tickStep(length: number): number {
+  if (length > 300) return 60;
+  if (length > 60) return 10;
+  if (length > 20) return 5;
+  if (length > 8) return 1;
+  if (length > 2) return 0.5;
+  if (length > 0.5) return 0.1;
+  return 0.02;
+}
