@@ -35,7 +35,7 @@ FLOORS = {
     "hfg.activity": 4,
     "hfg.links": 4,
     "hfg.links.running": 5,
-    "hfg.links.meeting": 5,
+    "hfg.links.pubsub": 5,
     "hfg.links.local": 5,
     "hfg.timeline": 4,
     "hfg.engine": 5,
@@ -59,7 +59,7 @@ SAME_FLOOR_FREE = {0, 2}  # one vocabulary each: what everybody speaks of, and w
 SAME_FLOOR_PAIRS = {
     ("hfg.cli", "hfg.studio"),
     ("hfg.engine", "hfg.links.running"),
-    ("hfg.links.meeting", "hfg.links.running"),
+    ("hfg.links.pubsub", "hfg.links.running"),
     ("hfg.parts.transports", "hfg.links.local"),  # the one that is always there
     ("hfg.__main__", "hfg.cli"),
     ("hfg.testing", "hfg"),

@@ -21,7 +21,7 @@ from hfg.cli import show
 from hfg.cli.options import SettingsOption
 from hfg.errors import TargetError
 from hfg.parts.hosts.agent import Agent
-from hfg.parts.hosts.hosting import Computer, Journal, logs_folder
+from hfg.parts.hosts.hosting import Journal, ThisComputer, logs_folder
 from hfg.parts.running.rings import sweep_runs
 from hfg.parts.transports import open_session
 
@@ -57,7 +57,7 @@ async def _serve(settings: dict[str, Any], folder: Path) -> int:
     try:
         journal = Journal(logs_folder(), session.host)
         journal.open()
-        one = Agent(session, Computer(session, settings, journal, folder))
+        one = Agent(session, ThisComputer(session, settings, journal, folder))
         with _ending() as ended:
             try:
                 await one.open()

@@ -16,8 +16,8 @@ from typing import Final
 import msgspec
 
 from hfg.cli.app import main as command
-from hfg.parts.hosts.abroad import deployed_as
 from hfg.parts.hosts.hosting import Deployed
+from hfg.parts.hosts.remote_parts import deployed_as
 
 __all__ = ["main"]
 

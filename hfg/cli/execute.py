@@ -12,7 +12,7 @@ from hfg.engine import PunctualLoop, Report, Run, VirtualTimeLoop, run_async
 from hfg.engine.runtime.interrupt import named
 from hfg.errors import HfgError, TargetError, UsageError
 from hfg.graph import Graph
-from hfg.parts.processes.meeting import MeetingPlace
+from hfg.parts.processes.rendezvous import Rendezvous
 
 __all__ = ["execute"]
 
@@ -39,7 +39,7 @@ def execute(
       TargetError: the options do not fit.
     """
     begun_run: Run | None = None
-    interrupt.before_leaving.append(MeetingPlace.leave_all)
+    interrupt.before_leaving.append(Rendezvous.leave_all)
     interrupt.what = named(graph)
 
     async def main() -> Report:

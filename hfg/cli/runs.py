@@ -56,7 +56,7 @@ _LOOKS_AGAIN_S: Final = 0.5
 _BEGINS_S: Final = 60.0
 _ENDS_S: Final = 15.0
 _PATIENCE_S: Final = 2.0  # for one look
-_FIRST_LIFE: Final = 1
+_FIRST_INCARNATION: Final = 1
 
 RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="name of the run, its first characters, or the name of its graph")
@@ -278,7 +278,7 @@ async def _gone(realm: Realm, agent: AgentIs, run: str) -> bool:
     """
     while True:
         try:
-            told = await _ask_agent(realm, agent, Wait(run, "", _FIRST_LIFE), Gone, timeout_s=20.0)
+            told = await _ask_agent(realm, agent, Wait(run, "", _FIRST_INCARNATION), Gone, timeout_s=20.0)
         except NoAnswer:
             if agent_place(agent) not in realm.agents:
                 raise TransportError(f'the agent of host "{agent.host}" is gone, and the run with it') from None
@@ -351,7 +351,7 @@ async def _stop(settings: str | None, name: str) -> int:
             _need_permission(run, await _parts(realm, run))
         for agent in realm.of(run.host):  # its main part does not answer: whoever has begun it ends it
             with contextlib.suppress(HfgError):
-                await _ask_agent(realm, agent, End(f"hfg/{run.run}", "", _FIRST_LIFE), Done, timeout_s=_ENDS_S)
+                await _ask_agent(realm, agent, End(f"hfg/{run.run}", "", _FIRST_INCARNATION), Done, timeout_s=_ENDS_S)
         if await realm.until(lambda: place not in realm.runs, FINDS_S):
             show.sentence(f"run {run.run} did not answer; its process was ended")
             return 1

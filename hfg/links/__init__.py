@@ -7,9 +7,9 @@ bounded               both ends of the link that may lose tokens and counts them
 running               the ends in operation: over a session of a transport, on an event loop
 local                 directly between processes of one host, in addition to a session
 offers                what programs that connect by a name announce, and which of them match
-meeting               these programs: the publishing and the subscribing end
+pubsub                these programs: the publishing and the subscribing end
 
-All except `running`, `local` and `meeting` are plain state machines: frames, tokens and the time go in, frames and
+All except `running`, `local` and `pubsub` are plain state machines: frames, tokens and the time go in, frames and
 tokens come out.
 """
 

@@ -23,8 +23,8 @@ from hfg.graph import Graph
 from hfg.graph.flat import flatten
 from hfg.graph.graph import graph_of
 from hfg.graph.structure.level import level_of
-from hfg.links.meeting import OutboxFile, Publication, Subscription
 from hfg.links.offers import need_link_name
+from hfg.links.pubsub import OutboxFile, Publication, Subscription
 from hfg.nodes._sessions import share
 from hfg.nodes.files.access import is_a_path
 from hfg.nodetypes.node import Node

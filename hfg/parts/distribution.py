@@ -28,16 +28,16 @@ from hfg.engine.observing.report import EdgeReport, Report
 from hfg.errors import HfgError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatGraph, cut
+from hfg.parts.hosts.announcement import Announcement
 from hfg.parts.hosts.realm import PartIs
-from hfg.parts.hosts.standing import Standing
 from hfg.parts.model.agreement import Agreement, Question, Rest
 from hfg.parts.model.clocks import RunClock, machine
 from hfg.parts.model.components import components
 from hfg.parts.model.costs import uncounted
+from hfg.parts.model.deaths import LIMIT, WITHIN_S
 from hfg.parts.model.failing import as_error
 from hfg.parts.model.inheriting import inherited, keeping, remembered
 from hfg.parts.model.ledgers import Entry, Ledger, ledger_of
-from hfg.parts.model.lives import LIMIT, WITHIN_S
 from hfg.parts.model.messages import (
     Ask,
     AskTime,
@@ -62,9 +62,9 @@ from hfg.parts.model.messages import (
     Told,
     Untrue,
 )
-from hfg.parts.model.sieve import sieve
-from hfg.parts.processes.other import Launcher, Other
-from hfg.parts.processes.worker import FIRST_LIFE
+from hfg.parts.model.trace_filter import trace_filter
+from hfg.parts.processes.peer_process import Launcher, PeerProcess
+from hfg.parts.processes.worker import FIRST_INCARNATION
 from hfg.parts.running.channels import Channel, name_of
 from hfg.parts.running.part import Part
 from hfg.parts.running.part_links import PartLinks
@@ -120,18 +120,18 @@ class Distribution:
         self._launcher = launcher
         self._modules = dict(modules or {})
         self._run = f"hfg/{name or uuid.uuid4().hex[:12]}"
-        self._lives = dict.fromkeys(cutting.parts, FIRST_LIFE)
+        self._incarnations = dict.fromkeys(cutting.parts, FIRST_INCARNATION)
         self._agreement = Agreement(
             cutting.parts,
             self._ask,
             lossy=[edge.label for edge in cutting.edges if edge.guarantee == "bounded"],
             wait=self._look_later,
         )
-        self._others = {name: Other(name) for name in cutting.parts if name != MAIN}
+        self._others = {name: PeerProcess(name) for name in cutting.parts if name != MAIN}
         self._asking = Asking(flat, cutting, self._call)
         self._run_of_all: Run
         self._part: Part
-        self._standing: Standing | None = None
+        self._announcement: Announcement | None = None
         self._carrier: PartLinks | None = None
         self._is_open = False
         self._has_begun = False
@@ -144,7 +144,7 @@ class Distribution:
             )
             for name in cutting.parts
         }
-        self._newest = FIRST_LIFE  # of all parts together, so that a stream that starts later is higher on any link
+        self._newest = FIRST_INCARNATION  # of all parts together, so that later streams are higher on any link
 
     # --- the beginning ----------------------------------------------------------------------------------------------
 
@@ -160,7 +160,7 @@ class Distribution:
             inherited=inherited(cutting),
             remembered=remembered(cutting),
         )
-        composition.consumers.leave_out(sieve(MAIN, self._drawing.cutting.edges))
+        composition.consumers.leave_out(trace_filter(MAIN, self._drawing.cutting.edges))
         composition.engine.callbacks.finished.append(self._ended_here)
 
     def face(self, graph: Graph) -> Run:
@@ -182,7 +182,7 @@ class Distribution:
         self._session = session = await self._launcher.open()
         await self._launcher.prepare({name: self._host(name) for name in self._others}, self._modules)
         if self._launcher.is_in_realm:
-            self._standing = Standing(session, self._run, self._run_of_all, self._parts, self._restart)
+            self._announcement = Announcement(session, self._run, self._run_of_all, self._parts, self._restart)
         edges = list(self._drawing.cutting.edges_of(MAIN))
         if self._launcher.shares_memory:
             sweep_runs()
@@ -193,7 +193,7 @@ class Distribution:
             session,
             self._launcher.near or session,
             self._run,
-            self._lives,
+            self._incarnations,
             edges,
             self._say,
             remembered(self._drawing.cutting),
@@ -202,8 +202,8 @@ class Distribution:
         )
         for other in self._others.values():
             await self._launch(other)
-            if self._lives[other.name] > self._lives[MAIN]:
-                self._carrier.admit(other.name, self._lives[other.name])
+            if self._incarnations[other.name] > self._incarnations[MAIN]:
+                self._carrier.admit(other.name, self._incarnations[other.name])
         while waiting := [other for other in self._others.values() if other.state != "running"]:
             for other in waiting:
                 await other.wait_opened()
@@ -220,22 +220,22 @@ class Distribution:
             self._ledgers[name] = ledger_of(where, name)
         kept = [name for name, ledger in self._ledgers.items() if ledger.entry is not None]
         if kept:
-            first = 1 + max([ledger.entry.life for ledger in self._ledgers.values() if ledger.entry is not None])
-            self._lives = dict.fromkeys(self._lives, first)
+            first = 1 + max([ledger.entry.incarnation for ledger in self._ledgers.values() if ledger.entry is not None])
+            self._incarnations = dict.fromkeys(self._incarnations, first)
             self._newest = first
             for name in kept:
                 self._newest += 1
-                self._lives[name] = self._newest
+                self._incarnations[name] = self._newest
 
-    def _channel_to(self, other: Other) -> Channel:
-        lives = (FIRST_LIFE, self._lives[other.name])
-        return Channel(self._session, self._run, MAIN, other.name, lives, partial(self._hear, other))
+    def _channel_to(self, other: PeerProcess) -> Channel:
+        incarnations = (FIRST_INCARNATION, self._incarnations[other.name])
+        return Channel(self._session, self._run, MAIN, other.name, incarnations, partial(self._hear, other))
 
-    async def _launch(self, other: Other) -> None:
+    async def _launch(self, other: PeerProcess) -> None:
         """Start the process of a part and have it set up its nodes; the part reports when this is done."""
         name = other.name
-        lives = (self._lives[name], FIRST_LIFE)
-        launched = await self._launcher.launch(self._run, name, self._host(name), lives)
+        incarnations = (self._incarnations[name], FIRST_INCARNATION)
+        launched = await self._launcher.launch(self._run, name, self._host(name), incarnations)
         other.live(launched, partial(self._gone, other))
         calls = self._asking.open(name)
         shares = self._launcher.shares_memory
@@ -243,7 +243,7 @@ class Distribution:
         clock = RunClock(machine(), engine.ahead_s, engine.began_at)
         ledger = self._ledgers.get(name)
         kept = None if ledger is None or ledger.entry is None else ledger.entry.data
-        lives_of_all, known = dict(self._lives), _known_packages()
+        lives_of_all, known = dict(self._incarnations), _known_packages()
         self._say(name, Open(self._drawing.text, self._options, lives_of_all, clock, known, shares, calls, kept))
 
     def begin(self) -> None:
@@ -261,7 +261,7 @@ class Distribution:
         if self._others[part].is_there:
             self._say(part, call)
 
-    def _hear(self, other: Other, message: Message) -> None:
+    def _hear(self, other: PeerProcess, message: Message) -> None:
         if isinstance(message, OfAnEdge):
             assert self._carrier is not None
             self._carrier.hear(other.name, message)
@@ -297,7 +297,7 @@ class Distribution:
         except msgspec.ValidationError as error:
             raise Untrue(f"which is not an answer to that question: {error}") from error
 
-    def _need_own(self, other: Other, message: Message) -> None:
+    def _need_own(self, other: PeerProcess, message: Message) -> None:
         """Check that a part's message is about its own edges and nodes.
 
         Raises:
@@ -347,7 +347,7 @@ class Distribution:
 
     # --- the end ----------------------------------------------------------------------------------------------------
 
-    def _error(self, failed: Failed, other: Other) -> HfgError:
+    def _error(self, failed: Failed, other: PeerProcess) -> HfgError:
         return as_error(failed, f"the process of group {other.name!r}")
 
     def _ended_here(self) -> None:
@@ -356,7 +356,7 @@ class Distribution:
             if other.is_there:
                 self._say(name, Finish(self._part.engine.outcome))
 
-    def _ended_there(self, other: Other, message: Ended) -> None:
+    def _ended_there(self, other: PeerProcess, message: Ended) -> None:
         """Another part has ended, by itself or because it was told to; so all parts end.
 
         Exception: a process that has to leave, because of its agent or a restart, is replaced by another one.
@@ -367,7 +367,7 @@ class Distribution:
         self._part.finish(message.outcome, error)
         self._asking.over(other.name)
 
-    def _gone(self, other: Other, how: str) -> None:
+    def _gone(self, other: PeerProcess, how: str) -> None:
         """A process has ended that was not told to; another one takes its place."""
         self._agreement.leave(other.name)
         self._asking.gone(other.name, RunError(f'the process of group "{other.name}" is gone: {how}'))
@@ -426,21 +426,21 @@ class Distribution:
             told.append(PartIs(name, self._host(name) or here, one.process, one.state, one.restarts, one.up_s))
         return told
 
-    async def _bring_back(self, other: Other, pause_s: float) -> None:
-        """Begin another life of a part, while all others wait for it as they do for one that is slow (L3)."""
+    async def _bring_back(self, other: PeerProcess, pause_s: float) -> None:
+        """Begin another incarnation of a part, while all others wait for it as they do for one that is slow (L3)."""
         await asyncio.sleep(pause_s)
         name = other.name
         try:
             await other.bury()
             self._newest += 1
-            self._lives[name] = life = self._newest
+            self._incarnations[name] = incarnation = self._newest
             other.begin(self._channel_to(other))
             for one in self._others.values():
                 if one.is_told:
-                    self._say(one.name, Reborn(name, life))
+                    self._say(one.name, Reborn(name, incarnation))
             await self._launch(other)
             assert self._carrier is not None
-            self._carrier.admit(name, life)
+            self._carrier.admit(name, incarnation)
             await other.wait_opened()
         except HfgError as error:
             other.answer(error)
@@ -474,8 +474,8 @@ class Distribution:
             ledger.close()
         if self._carrier is not None:
             await self._carrier.close()
-        if self._standing is not None:
-            self._standing.close()
+        if self._announcement is not None:
+            self._announcement.close()
         if self._launcher.shares_memory:
             sweep_run(self._run)  # of processes that were killed
         await self._launcher.close()
@@ -554,7 +554,7 @@ def distribute(
     from hfg.files import text_of
     from hfg.files.building import modules_of
     from hfg.files.describing import describe
-    from hfg.parts.hosts.abroad import AgentLauncher, deployed_as
+    from hfg.parts.hosts.remote_parts import AgentLauncher, deployed_as
     from hfg.parts.processes.launching import LoopLauncher, ProcessLauncher
 
     cutting = cut(flat)

@@ -13,7 +13,7 @@ import pytest
 
 import hfg
 from hfg.errors import NodeError, RunError
-from hfg.links.meeting.outbox import KeptValue, OutboxFile
+from hfg.links.pubsub.outbox import KeptValue, OutboxFile
 from hfg_transports.memory import Faults
 from tests.nodes.test_links import World, camera, numbers, play, running, viewer, world
 

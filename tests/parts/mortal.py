@@ -21,8 +21,8 @@ def mortal_parts(monkeypatch: pytest.MonkeyPatch, seed: int = 3) -> dict[str, An
         def __init__(self) -> None:
             super().__init__(network=Network(Faults(loss=0.2, repetition=0.1, delay_s=(0.001, 0.003)), seed=seed))
 
-        async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Any:
-            parts[part] = await super().launch(run, part, host, lives)
+        async def launch(self, run: str, part: str, host: str, incarnations: tuple[int, int]) -> Any:
+            parts[part] = await super().launch(run, part, host, incarnations)
             return parts[part]
 
     monkeypatch.setattr(launching, "LoopLauncher", Made)

@@ -12,7 +12,6 @@ import pytest
 import hfg
 from hfg.engine.face.watching import Answer, Question
 from hfg.errors import NoAnswer, QueryRefused, TransportError
-from hfg.parts.hosts.abroad import AgentLauncher
 from hfg.parts.hosts.agent import Agent
 from hfg.parts.hosts.realm import (
     GONE_S,
@@ -37,6 +36,7 @@ from hfg.parts.hosts.realm import (
     agent_place,
     ask,
 )
+from hfg.parts.hosts.remote_parts import AgentLauncher
 from hfg.parts.processes import launching
 from hfg_transports.memory import MemorySession, Network
 
@@ -80,7 +80,7 @@ class Computer:
         self._numbers = iter(range(1, 100))
 
     async def part(self, order: Start) -> Any:
-        task = await self._launcher.launch(order.run, order.part, "", order.lives)
+        task = await self._launcher.launch(order.run, order.part, "", order.incarnations)
         task.process = next(self._numbers)
         self.begun.setdefault(order.part, []).append(task)
         return task

@@ -145,9 +145,9 @@ def test_what_is_lost_before_a_ledger_is_counted_and_the_run_ends(
         def __init__(self) -> None:
             super().__init__(network=Network(Faults(loss=0.2, repetition=0.1, delay_s=(0.001, 0.003)), seed=seed))
 
-        async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Any:
-            launched = await super().launch(run, part, host, lives)
-            if part == "loses" and lives[0] == 1:
+        async def launch(self, run: str, part: str, host: str, incarnations: tuple[int, int]) -> Any:
+            launched = await super().launch(run, part, host, incarnations)
+            if part == "loses" and incarnations[0] == 1:
                 asyncio.get_running_loop().call_later(0.0537 + 0.0113 * seed, launched.kill)
             return launched
 

@@ -11,8 +11,8 @@ import pytest
 
 import hfg
 from hfg.graph.flat import cut, flatten
+from hfg.parts.model.deaths import Deaths
 from hfg.parts.model.inheriting import Alignment, Inheritance, inheriting, keeping
-from hfg.parts.model.lives import Deaths
 from hfg.parts.processes import launching
 from hfg_transports.memory import Faults, Network
 
@@ -68,8 +68,8 @@ class Killer(launching.LoopLauncher):
         self._plan = plan
         self._killing: asyncio.Task[None] | None = None
 
-    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Any:
-        launched = self.parts[part] = await super().launch(run, part, host, lives)
+    async def launch(self, run: str, part: str, host: str, incarnations: tuple[int, int]) -> Any:
+        launched = self.parts[part] = await super().launch(run, part, host, incarnations)
         self.lives[part] = self.lives.get(part, 0) + 1
         if self._killing is None:
             self._killing = asyncio.create_task(self._kill())

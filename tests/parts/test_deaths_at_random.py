@@ -17,8 +17,8 @@ import pytest
 
 import hfg
 from hfg.graph.flat import cut, flatten
+from hfg.parts.model.deaths import LIMIT
 from hfg.parts.model.inheriting import inheriting, keeping
-from hfg.parts.model.lives import LIMIT
 from hfg.parts.processes import launching
 from hfg.parts.running.channels import Channel
 from hfg_transports.memory import Faults, Network
@@ -175,8 +175,8 @@ class Reaper(launching.LoopLauncher):
         self.deaths: dict[str, int] = dict.fromkeys(mortal, 0)
         self._reaping: asyncio.Task[None] | None = None
 
-    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Any:
-        launched: Any = await super().launch(run, part, host, lives)
+    async def launch(self, run: str, part: str, host: str, incarnations: tuple[int, int]) -> Any:
+        launched: Any = await super().launch(run, part, host, incarnations)
         launched.begins = self._begin
         self._parts[part] = launched
         return launched

@@ -39,8 +39,8 @@ class Mortal(launching.LoopLauncher):
         self._moments = {part: list(moments[part]) for part in moments}
         self.lives: dict[str, int] = {}
 
-    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Any:
-        launched = await super().launch(run, part, host, lives)
+    async def launch(self, run: str, part: str, host: str, incarnations: tuple[int, int]) -> Any:
+        launched = await super().launch(run, part, host, incarnations)
         self.lives[part] = self.lives.get(part, 0) + 1
         if self._moments.get(part):
             asyncio.get_running_loop().call_later(self._moments[part].pop(0), launched.kill)

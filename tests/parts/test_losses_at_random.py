@@ -18,7 +18,7 @@ import pytest
 
 import hfg
 from hfg.base.token import NO_MESSAGE
-from hfg.parts.model.lives import LIMIT
+from hfg.parts.model.deaths import LIMIT
 from hfg.parts.processes import launching
 from hfg.trace import TokenTaken, TraceEvent
 from hfg_transports.memory import Network
@@ -166,8 +166,8 @@ class Reaper(launching.LoopLauncher):
         self.deaths: dict[str, int] = dict.fromkeys(mortal, 0)
         self._reaping: asyncio.Task[None] | None = None
 
-    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Any:
-        self._parts[part] = launched = await super().launch(run, part, host, lives)
+    async def launch(self, run: str, part: str, host: str, incarnations: tuple[int, int]) -> Any:
+        self._parts[part] = launched = await super().launch(run, part, host, incarnations)
         if self._reaping is None:
             self._reaping = asyncio.create_task(self._reap())
         return launched

@@ -40,7 +40,7 @@ from hfg.parts.model.messages import (
     pack,
     unpack,
 )
-from hfg.parts.model.sieve import sieve
+from hfg.parts.model.trace_filter import trace_filter
 from hfg.parts.running.channels import Channel, name_of
 from hfg.parts.running.part import Part
 from hfg.parts.running.part_links import PartLinks
@@ -184,7 +184,7 @@ def test_a_gap_in_the_numbers_of_an_edge_that_may_lose_is_counted_however_large_
 def test_each_event_of_an_edge_between_parts_is_told_by_one_of_them(label: str) -> None:
     cutting = cut(flatten(chain()))
     (edge,) = [edge for edge in cutting.edges if edge.label == label]
-    is_told = {part: sieve(part, cutting.edges_of(part)) for part in cutting.parts}
+    is_told = {part: trace_filter(part, cutting.edges_of(part)) for part in cutting.parts}
 
     def who_tells(event: TraceEvent) -> list[str]:
         return [part for part in cutting.parts if is_told[part](event)]

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from hfg.parts.processes import launching
-from hfg.parts.processes.meeting import MeetingPlace
+from hfg.parts.processes.rendezvous import Rendezvous
 from tests.limits import patience
 
 pytestmark = pytest.mark.slow
@@ -159,9 +159,9 @@ LEAVES_THE_COMMAND = """
     from hfg.cli.execute import execute
     from hfg.cli.interrupt import Interrupt
     from hfg.cli.options import Clock
-    from hfg.parts.processes.meeting import MeetingPlace
+    from hfg.parts.processes.rendezvous import Rendezvous
     def begin(run):
-        begin.place = MeetingPlace()
+        begin.place = Rendezvous()
         for _ in range(2):
             os.kill(os.getpid(), signal.SIGINT)
     with Interrupt.installed() as interrupt:
@@ -186,7 +186,7 @@ def test_the_next_run_removes_what_runs_have_left_that_were_killed_and_nothing_e
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    left, lives, young = MeetingPlace(), MeetingPlace(), MeetingPlace()
+    left, lives, young = Rendezvous(), Rendezvous(), Rendezvous()
     others = [tmp_path / "hfg-something", tmp_path / "hfg-meet-notes", tmp_path / f"{left.folder.name}-of-mine"]
     for other in others:
         other.mkdir()
@@ -198,7 +198,7 @@ def test_the_next_run_removes_what_runs_have_left_that_were_killed_and_nothing_e
         place._lock = None
     for folder in (left.folder, lives.folder, *others):
         os.utime(folder, (0, 0))
-    following = MeetingPlace()
+    following = Rendezvous()
     found = {folder.name for folder in tmp_path.iterdir()}
     assert found == {one.name for one in (lives.folder, young.folder, following.folder, *others)}
     for place in (left, lives, young, following):
@@ -210,8 +210,8 @@ def test_the_next_run_removes_what_runs_have_left_that_were_killed_and_nothing_e
 def test_a_process_that_is_forked_from_a_run_leaves_its_folder_alone(tmp_path: Path) -> None:
     forks = """
         import os, sys
-        from hfg.parts.processes.meeting import MeetingPlace
-        place = MeetingPlace()
+        from hfg.parts.processes.rendezvous import Rendezvous
+        place = Rendezvous()
         if not os.fork():
             sys.exit()
         os.wait()
@@ -255,7 +255,7 @@ def test_a_process_that_waits_already_takes_the_place_of_one_that_dies(tmp_path:
     running = program(
         tmp_path,
         f"""
-    from hfg.parts.processes import spares
+    from hfg.parts.processes import standby
 
     waiting = []
 
@@ -281,7 +281,7 @@ def test_a_process_that_waits_already_takes_the_place_of_one_that_dies(tmp_path:
         return os.getpid()
 
     if __name__ == "__main__":
-        spares.AFTER_S = 0.0
+        standby.AFTER_S = 0.0
         graph = hfg.Graph()
         graph.group("far", process=True)
         source, one = graph.add(patient()), graph.add(where(flag={str(tmp_path / "flag")!r}), group="far")

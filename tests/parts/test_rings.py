@@ -227,7 +227,7 @@ def test_a_consumer_that_begins_anew_waits_for_the_ring_before_it_sees_what_is_s
         edge.see(sent)
     assert edge.borrowing.is_awaited
     assert not is_lent(edge.send(LARGE, 8))
-    edge.lending.seen(edge.sees[0])  # a late word of the former life says nothing of this one
+    edge.lending.seen(edge.sees[0])  # a late word of the previous incarnation says nothing of this one
     assert not is_lent(edge.send(LARGE, 8))
     edge.agree()
     assert (edge.see(sent) == 7).all()

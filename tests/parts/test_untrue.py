@@ -139,8 +139,8 @@ class World:
         monkeypatch.setattr(Channel, "refuse", note_refused)
 
         class Beginning(LoopLauncher):
-            async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Any:
-                launched: Any = await super().launch(run, part, host, lives)
+            async def launch(self, run: str, part: str, host: str, incarnations: tuple[int, int]) -> Any:
+                launched: Any = await super().launch(run, part, host, incarnations)
                 launched.begins = begun.set
                 return launched
 
@@ -287,7 +287,7 @@ def test_who_was_not_asked_to_look_is_not_heard_and_what_cannot_be_read_is_refus
 
     async def plan(run: hfg.Run) -> None:
         tap, other = run.tap("first.out"), run.tap("second.out")
-        numbers = sorted(cut_run(run)._asking._standing)
+        numbers = sorted(cut_run(run)._asking._subscriptions)
         await asyncio.sleep(0.01)
         world.say(MAIN, Seen(numbers[0], tokens=[PARCEL]))  # which the other part was asked for
         world.say(MAIN, Seen(numbers[1], tokens=[Parcel(b"\xff", b"", shown="me")]))

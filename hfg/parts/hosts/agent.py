@@ -37,9 +37,10 @@ from hfg.parts.hosts.realm import (
     run_place,
     serve,
 )
+from hfg.parts.processes.peer_process import Launched
 from hfg.transport import Closing, Session
 
-__all__ = ["WAITS_S", "Agent", "Host", "Hosted"]
+__all__ = ["WAITS_S", "Agent", "Computer"]
 
 _LOGGER = Log("hfg.agent")
 
@@ -48,39 +49,20 @@ WAITS_S: Final = 10.0
 
 _LOOKS_S: Final = 0.5  # time to look for another agent of the same name before announcing this one
 _MAIN: Final = ""
-_FIRST_LIFE: Final = 1
+_FIRST_INCARNATION: Final = 1
 
 
-class Hosted(Protocol):
-    """A process that an agent has started; see `Launched`.
+class Computer(Protocol):
+    """The agent's interface to the computer that it runs on."""
 
-    Attributes:
-      process: its id.
-    """
-
-    process: int
-
-    async def wait(self) -> str:
-        """Wait until it is gone. Return a message about how it ended."""
-
-    def begins(self) -> None:
-        """From now on it may be expected to answer."""
-
-    async def end(self) -> None:
-        """See to it that it is gone."""
-
-
-class Host(Protocol):
-    """The agent's interface to its computer."""
-
-    async def part(self, order: Start) -> Hosted:
+    async def part(self, order: Start) -> Launched:
         """Start a part.
 
         Raises:
           HfgError: it cannot be started.
         """
 
-    async def main(self, order: Deploy) -> Hosted:
+    async def main(self, order: Deploy) -> Launched:
         """Begin the main part of a run."""
 
     def missing(self, modules: list[str]) -> Missing:
@@ -96,19 +78,19 @@ class Host(Protocol):
         """Refuse to start anything from now on."""
 
 
-class _Charge:
+class _Incarnation:
     """One incarnation of a part of a run.
 
     Attributes:
-      life: its number.
+      incarnation: its number.
       begun: done when it has a process.
       gone: done when it has ended; how it ended.
     """
 
-    def __init__(self, life: int) -> None:
+    def __init__(self, incarnation: int) -> None:
         loop = asyncio.get_running_loop()
-        self.life = life
-        self.begun: asyncio.Future[Hosted] = loop.create_future()
+        self.incarnation = incarnation
+        self.begun: asyncio.Future[Launched] = loop.create_future()
         self.gone: asyncio.Future[str] = loop.create_future()
         self.task: asyncio.Task[None]
 
@@ -127,17 +109,17 @@ class Agent:
       me: its description of itself.
     """
 
-    def __init__(self, session: Session, host: Host) -> None:
+    def __init__(self, session: Session, computer: Computer) -> None:
         """Prepare it.
 
         Args:
           session: of the transport, on which parts of runs find each other.
-          host: what it is on.
+          computer: the computer that it runs on.
         """
         self.me: AgentIs = myself(session.host)
         self._session = session
-        self._host = host
-        self._charges: dict[tuple[str, str], _Charge] = {}
+        self._computer = computer
+        self._charges: dict[tuple[str, str], _Incarnation] = {}
         self._leaving: dict[str, asyncio.TimerHandle] = {}  # runs of which nothing is heard
         self._tasks: set[asyncio.Task[None]] = set()
         self._answers: list[Closing] = []
@@ -221,7 +203,7 @@ class Agent:
         mains = [(key, charge) for key, charge in self._charges.items() if key[1] == _MAIN]
         await asyncio.gather(*(self._let_go(key, charge) for key, charge in mains))  # they ask for the end of others
         await asyncio.gather(*(self._let_go(key, charge) for key, charge in list(self._charges.items())))
-        await self._host.close()
+        await self._computer.close()
         for timer in self._leaving.values():
             timer.cancel()
         for answer in self._answers:
@@ -239,34 +221,36 @@ class Agent:
     # --- what it is asked -------------------------------------------------------------------------------------------
 
     async def _check(self, request: Check) -> Missing:
-        return self._host.missing(request.modules)
+        return self._computer.missing(request.modules)
 
     async def _start(self, order: Start) -> Started:
-        return await self._take((order.run, order.part), order.lives[0], order)
+        return await self._take((order.run, order.part), order.incarnations[0], order)
 
     async def _deploy(self, order: Deploy) -> Started:
-        return await self._take((order.run, _MAIN), _FIRST_LIFE, order)
+        return await self._take((order.run, _MAIN), _FIRST_INCARNATION, order)
 
-    async def _take(self, key: tuple[str, str], life: int, order: Start | Deploy) -> Started:
+    async def _take(self, key: tuple[str, str], incarnation: int, order: Start | Deploy) -> Started:
         if self._is_closing:
             raise UsageError(f'the agent of host "{self.me.host}" is being ended')
         charge = self._charges.get(key)
-        if charge is None or charge.life < life:
-            former, charge = charge, _Charge(life)
+        if charge is None or charge.incarnation < incarnation:
+            former, charge = charge, _Incarnation(incarnation)
             self._charges[key] = charge
             charge.task = asyncio.create_task(self._run(charge, former, key, order), name=f"hfg part {key[1]}")
             if isinstance(order, Start):
                 self._look_at(key[0])
-        elif charge.life > life:
-            raise UsageError(f'incarnation {life} of group "{key[1]}" is over: {charge.life} has started')
+        elif charge.incarnation > incarnation:
+            raise UsageError(f'incarnation {incarnation} of group "{key[1]}" is over: {charge.incarnation} has started')
         return Started((await asyncio.shield(charge.begun)).process)
 
-    async def _run(self, charge: _Charge, former: _Charge | None, key: tuple[str, str], order: Start | Deploy) -> None:
+    async def _run(
+        self, charge: _Incarnation, former: _Incarnation | None, key: tuple[str, str], order: Start | Deploy
+    ) -> None:
         """Run one incarnation: wait for the end of the previous one, start it, and wait for its end."""
         try:
             if former is not None:
                 await former.end()
-            hosted = await (self._host.part(order) if isinstance(order, Start) else self._host.main(order))
+            hosted = await (self._computer.part(order) if isinstance(order, Start) else self._computer.main(order))
         except Exception as error:
             known = error if isinstance(error, HfgError) else TransportError(f"it cannot be started: {in_words(error)}")
             charge.begun.set_exception(known)
@@ -281,9 +265,9 @@ class Agent:
             self._charges.pop(key, None)
             self._done_with(key[0])
 
-    def _of(self, request: Begins | Wait | End) -> _Charge | None:
+    def _of(self, request: Begins | Wait | End) -> _Incarnation | None:
         charge = self._charges.get((request.run, request.part))
-        return charge if charge is not None and charge.life == request.life else None
+        return charge if charge is not None and charge.incarnation == request.incarnation else None
 
     async def _begins(self, request: Begins) -> Done:
         charge = self._of(request)
@@ -304,7 +288,7 @@ class Agent:
             await self._let_go((request.run, request.part), charge)
         return Done()
 
-    async def _let_go(self, key: tuple[str, str], charge: _Charge) -> None:
+    async def _let_go(self, key: tuple[str, str], charge: _Incarnation) -> None:
         await charge.end()
         if self._charges.get(key) is charge:
             del self._charges[key]
@@ -315,7 +299,7 @@ class Agent:
             leaving = self._leaving.pop(run, None)
             if leaving is not None:
                 leaving.cancel()
-            self._host.forget(run)
+            self._computer.forget(run)
 
     async def _read_log(self, request: ReadLog) -> Chunk:
-        return self._host.read_log(request.run, request.offset)
+        return self._computer.read_log(request.run, request.offset)

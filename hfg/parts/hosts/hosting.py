@@ -21,13 +21,13 @@ import msgspec
 from hfg.base.private import open_private, state_folder
 from hfg.errors import TransportError
 from hfg.parts.hosts.realm import Chunk, Deploy, Missing, Start, run_id
-from hfg.parts.processes.launching import Begun, PartProcess, beat_of
-from hfg.parts.processes.meeting import MeetingPlace
-from hfg.parts.processes.spares import Spares
+from hfg.parts.processes.launching import Instructions, PartProcess, beat_of
+from hfg.parts.processes.rendezvous import Rendezvous
+from hfg.parts.processes.standby import Standby
 from hfg.parts.running.rings import sweep_run
 from hfg.transport import Session
 
-__all__ = ["Computer", "Deployed", "Journal", "is_importable", "logs_folder"]
+__all__ = ["Deployed", "Journal", "ThisComputer", "is_importable", "logs_folder"]
 
 _LONGEST_LINE: Final = 64 * 1024
 _LONGEST_LOG: Final = 16 * 2**20
@@ -51,7 +51,7 @@ class Deployed(msgspec.Struct, frozen=True):
     folder: str
 
 
-class Computer:
+class ThisComputer:
     """This computer, for its agent.
 
     Args:
@@ -67,16 +67,16 @@ class Computer:
         self._journal = journal
         self._folder = folder
         self._path = [str(folder), *(one for one in sys.path if one)]
-        self._spares = Spares(keeps_output=True)
-        self._places: dict[str, MeetingPlace] = {}  # of the parts of each run that are here
+        self._standby = Standby(keeps_output=True)
+        self._places: dict[str, Rendezvous] = {}  # of the parts of each run that are here
 
     async def part(self, order: Start) -> PartProcess:
-        """See `Host`."""
-        life = order.lives[0]
-        begun = Begun(
+        """See `Computer`."""
+        incarnation = order.incarnations[0]
+        begun = Instructions(
             order.run,
             order.part,
-            order.lives,
+            order.incarnations,
             self._settings,
             order.argv,
             main="",
@@ -84,21 +84,21 @@ class Computer:
             path=self._path,
             parent=os.getpid(),
             folder=str(self._place(order.run).folder),
-            beat=beat_of(order.run, order.part, life),
+            beat=beat_of(order.run, order.part, incarnation),
             level=order.level,
         )
-        process = await PartProcess.begin(order.part, begun, keeps_output=True, spares=self._spares)
+        process = await PartProcess.begin(order.part, begun, keeps_output=True, standby=self._standby)
         process.watch(self._session, begun.beat)
         self._journal.keep(order.run, order.part, process)
         return process
 
-    def _place(self, run: str) -> MeetingPlace:
+    def _place(self, run: str) -> Rendezvous:
         if run not in self._places:
-            self._places[run] = MeetingPlace()
+            self._places[run] = Rendezvous()
         return self._places[run]
 
     async def main(self, order: Deploy) -> PartProcess:
-        """See `Host`."""
+        """See `Computer`."""
         folder = order.folder or str(self._folder)
         if not _is_folder(folder):
             raise TransportError(f'host "{self._session.host}" has no folder {folder}, from which it was to run')
@@ -108,23 +108,23 @@ class Computer:
         return process
 
     def missing(self, modules: list[str]) -> Missing:
-        """See `Host`."""
+        """See `Computer`."""
         return Missing([one for one in modules if not is_importable(one, self._path)], str(self._folder))
 
     def read_log(self, run: str, offset: int) -> Chunk:
-        """See `Host`."""
+        """See `Computer`."""
         return self._journal.read(run, offset)
 
     def forget(self, run: str) -> None:
-        """See `Host`."""
+        """See `Computer`."""
         sweep_run(run)
         place = self._places.pop(run, None)
         if place is not None:
             place.leave()
 
     async def close(self) -> None:
-        """See `Host`."""
-        await self._spares.close()
+        """See `Computer`."""
+        await self._standby.close()
         for run in tuple(self._places):
             self.forget(run)
 

@@ -97,7 +97,7 @@ class AgentIs(msgspec.Struct, frozen=True):
 
     Attributes:
       host: its name.
-      incarnation: which life of it.
+      incarnation: which incarnation of it.
       process: its process id.
       hfg, python: versions.
     """
@@ -174,7 +174,7 @@ class Start(msgspec.Struct, frozen=True):
 
     Attributes:
       run, part: names of both.
-      lives: its incarnation, and that of the main part.
+      incarnations: its incarnation, and that of the main part.
       argv: arguments of the main program.
       level: level of the log records that it wants.
     """
@@ -182,7 +182,7 @@ class Start(msgspec.Struct, frozen=True):
     verb: ClassVar[str] = "rw/start"
     run: str
     part: str
-    lives: tuple[int, int]
+    incarnations: tuple[int, int]
     argv: list[str]
     level: int
 
@@ -211,11 +211,11 @@ class Started(msgspec.Struct, frozen=True):
 
 
 class _OfAPart(msgspec.Struct, frozen=True):
-    """A verb for one life of a part of a run."""
+    """A verb for one incarnation of a part of a run."""
 
     run: str
     part: str
-    life: int
+    incarnation: int
 
 
 class Begins(_OfAPart, frozen=True):

@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 Where: TypeAlias = tuple[int, int]
-"""The position of a token: stream and number. Over an edge from an output numbers grow by one through all lives."""
+"""The position of a token: stream and number. On an edge from an output, numbers grow by one in all incarnations."""
 
 UNKNOWN: Final[Where] = (-1, 0)
 """Position reported by an incarnation of a part that does not know yet where it resumes."""

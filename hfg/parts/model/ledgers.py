@@ -18,11 +18,11 @@ class Entry(NamedTuple):
     """The stored data of a part.
 
     Attributes:
-      life: the highest incarnation number in its run.
+      incarnation: the highest incarnation number in its run.
       data: as the part has sent it.
     """
 
-    life: int
+    incarnation: int
     data: bytes
 
 
@@ -86,17 +86,17 @@ class LedgerFile(Ledger):
         except sqlite3.Error as error:
             raise self._refuse(error) from error
         if found is not None:
-            life, checksum, data = found
+            incarnation, checksum, data = found
             if zlib.crc32(data) != checksum:
                 raise RunError(
                     f'ledger "{path}" of group "{part}" is broken: its checksum does not match; restore it '
                     "from a copy, or remove it to start over"
                 )
-            self.entry = Entry(life, data)
+            self.entry = Entry(incarnation, data)
 
     def write(self, entry: Entry) -> None:
         """See `Ledger`."""
-        row = (self._part, entry.life, zlib.crc32(entry.data), entry.data)
+        row = (self._part, entry.incarnation, zlib.crc32(entry.data), entry.data)
         try:
             self._file.execute("INSERT OR REPLACE INTO hfg_ledger VALUES (?, ?, ?, ?)", row)
         except sqlite3.Error as error:

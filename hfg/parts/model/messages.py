@@ -118,12 +118,12 @@ class Open(msgspec.Struct, frozen=True, tag=True):
     Attributes:
       graph: the text of a graph file: the whole graph, of which it makes its part.
       options: of the run, as `hfg.run` takes them.
-      incarnations: which life of each part this is for.
+      incarnations: which incarnation of each part this is for.
       clock: of the run.
       allow: packages whose node types may be imported.
       shares_memory: large arrays may go through shared memory.
       calls: what was asked for already, to be done before the nodes are set up.
-      kept: what the ledger has of former lives of the part.
+      kept: what the ledger has of previous incarnations of the part.
     """
 
     graph: str
@@ -352,7 +352,7 @@ class Reborn(msgspec.Struct, frozen=True, tag=True):
     """A part has died and is restarted: from now on this incarnation is trusted."""
 
     part: str
-    life: Counted
+    incarnation: Counted
 
 
 class Joins(msgspec.Struct, frozen=True, tag=True):
@@ -415,7 +415,7 @@ class Shares(msgspec.Struct, frozen=True, tag=True):
     Attributes:
       label: of the edge.
       segment: what the memory is called.
-      lane: the number under which this life of the consumer opens it.
+      lane: the number under which this incarnation of the consumer opens it.
     """
 
     label: str

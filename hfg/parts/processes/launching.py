@@ -21,14 +21,23 @@ import msgspec
 from hfg.errors import HfgError, TransportError, UsageError, in_words
 from hfg.graph import Graph
 from hfg.parts.model.messages import Open
-from hfg.parts.processes.meeting import MeetingPlace
-from hfg.parts.processes.spares import PROCESS, Spares, start
+from hfg.parts.processes.rendezvous import Rendezvous
+from hfg.parts.processes.standby import PROCESS, Standby, start
 from hfg.parts.processes.worker import Worker
 from hfg.parts.running.channels import name_of
 from hfg.parts.transports import open_sessions, transport
 from hfg.transport import Buffer, Session
 
-__all__ = ["BEAT_S", "STARTS_S", "Begun", "LoopLauncher", "PartProcess", "ProcessLauncher", "beat_of", "build_graph"]
+__all__ = [
+    "BEAT_S",
+    "STARTS_S",
+    "Instructions",
+    "LoopLauncher",
+    "PartProcess",
+    "ProcessLauncher",
+    "beat_of",
+    "build_graph",
+]
 
 BEAT_S: Final = 0.5
 """How often a process reports that its event loop is running."""
@@ -39,13 +48,13 @@ STARTS_S: Final = 60.0
 _ENDS_S: Final = 2.0  # how long a process may take to exit by itself, once it was told to
 
 
-class Begun(msgspec.Struct, frozen=True):
+class Instructions(msgspec.Struct, frozen=True):
     """The instructions for a process on its standard input, as one line of JSON.
 
     Attributes:
       run: the name by which all parts know the run.
       part: name of the part that it should serve.
-      lives: its incarnation, and that of the main part.
+      incarnations: its incarnation, and that of the main part.
       settings: settings of the network; None if all parts are on this host.
       argv: arguments of the program, which its main file may read when it is imported.
       main: the file of the program, for node types in it; "" if there is none.
@@ -59,7 +68,7 @@ class Begun(msgspec.Struct, frozen=True):
 
     run: str
     part: str
-    lives: tuple[int, int]
+    incarnations: tuple[int, int]
     settings: dict[str, Any] | None
     argv: list[str]
     main: str
@@ -117,10 +126,10 @@ class LoopLauncher:
     async def prepare(self, hosts: Mapping[str, str], modules: Mapping[str, str]) -> None:
         """See `Launcher`: all of it is here."""
 
-    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> _Task:
+    async def launch(self, run: str, part: str, host: str, incarnations: tuple[int, int]) -> _Task:
         """See `Launcher`."""
         session = await self._transport.open(**self._settings)
-        return _Task(session, Worker(session, run, part, lives, build_graph), part)
+        return _Task(session, Worker(session, run, part, incarnations, build_graph), part)
 
     async def close(self) -> None:
         """See `Launcher`."""
@@ -187,14 +196,14 @@ class ProcessLauncher:
     def __init__(self, settings: dict[str, Any] | None = None) -> None:
         self.near: Session | None = None
         self._settings = settings
-        self._place: MeetingPlace | None = None
+        self._place: Rendezvous | None = None
         self._session: Session | None = None
         self._opening: asyncio.Future[tuple[Session, Session]] | None = None
-        self._spares = Spares()
+        self._standby = Standby()
 
     async def open(self) -> Session:
         """See `Launcher`."""
-        self._place = MeetingPlace()
+        self._place = Rendezvous()
         self._opening = asyncio.ensure_future(open_sessions(self._settings, str(self._place.folder)))
         session, self.near = await asyncio.shield(self._opening)
         self._session = session
@@ -203,14 +212,14 @@ class ProcessLauncher:
     async def prepare(self, hosts: Mapping[str, str], modules: Mapping[str, str]) -> None:
         """See `Launcher`: what is here can be imported here."""
 
-    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> PartProcess:
+    async def launch(self, run: str, part: str, host: str, incarnations: tuple[int, int]) -> PartProcess:
         """See `Launcher`."""
         assert self._session is not None
         assert self._place is not None
-        begun = Begun(
+        begun = Instructions(
             run,
             part,
-            lives,
+            incarnations,
             self._settings,
             sys.argv,
             _main_program(),
@@ -218,16 +227,16 @@ class ProcessLauncher:
             sys.path,
             parent=os.getpid(),
             folder=str(self._place.folder),
-            beat=beat_of(run, part, lives[0]),
+            beat=beat_of(run, part, incarnations[0]),
             level=logging.getLogger("hfg").getEffectiveLevel(),
         )
-        process = await PartProcess.begin(part, begun, spares=self._spares)
+        process = await PartProcess.begin(part, begun, standby=self._standby)
         process.watch(self._session, begun.beat)
         return process
 
     async def close(self) -> None:
         """See `Launcher`."""
-        await self._spares.close()
+        await self._standby.close()
         if self._opening is not None:  # an interruption during it would leave its files in the folder
             with contextlib.suppress(HfgError):
                 for session in set(await self._opening):
@@ -236,9 +245,9 @@ class ProcessLauncher:
             self._place.leave()
 
 
-def beat_of(run: str, part: str, life: int) -> str:
+def beat_of(run: str, part: str, incarnation: int) -> str:
     """Return the key on which a process reports that its event loop is running."""
-    return f"{run}/beat/{name_of(part)}/{life}"
+    return f"{run}/beat/{name_of(part)}/{incarnation}"
 
 
 def _patience_s() -> float:
@@ -319,7 +328,7 @@ class PartProcess:
         *,
         module: str = PROCESS,
         keeps_output: bool = False,
-        spares: Spares | None = None,
+        standby: Standby | None = None,
     ) -> PartProcess:
         """Start the process.
 
@@ -328,12 +337,12 @@ class PartProcess:
           begun: the instructions on its standard input, which stays open.
           module: the module that it runs.
           keeps_output: its output can be read from `output`; otherwise it goes where this process's output goes.
-          spares: provides a spare process, if there is one, with the same `module` and `keeps_output`.
+          standby: provides a spare process, if there is one, with the same `module` and `keeps_output`.
 
         Raises:
           TransportError: it cannot be started.
         """
-        process = None if spares is None else spares.take()
+        process = None if standby is None else standby.take()
         try:
             process = process or await start(part, module, keeps_output=keeps_output)
         except OSError as error:

@@ -28,9 +28,9 @@ from hfg.engine import PunctualLoop
 from hfg.errors import HfgError, RunError, TransportError, in_words
 from hfg.graph import Graph
 from hfg.parts.model.messages import Logged, Open
-from hfg.parts.processes import meeting
-from hfg.parts.processes.launching import BEAT_S, Begun, build_graph
-from hfg.parts.processes.spares import SPARE
+from hfg.parts.processes import rendezvous
+from hfg.parts.processes.launching import BEAT_S, Instructions, build_graph
+from hfg.parts.processes.standby import STANDBY
 from hfg.parts.processes.worker import Worker
 from hfg.parts.transports import open_sessions
 from hfg.transport import Session, Traffic
@@ -45,10 +45,10 @@ def main() -> None:
     """Serve a part, until the run is over or the process that started this one is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the main part, which ends this one
     line = sys.stdin.buffer.readline(_LONGEST)
-    if not line and sys.argv[1:] == [SPARE]:
+    if not line and sys.argv[1:] == [STANDBY]:
         return  # it was not needed
     try:
-        begun = msgspec.json.decode(line, type=Begun)
+        begun = msgspec.json.decode(line, type=Instructions)
     except msgspec.DecodeError:
         raise SystemExit("this process serves a part of a run, which starts it; use hfg run") from None
     _be_called(begun.part)
@@ -74,13 +74,13 @@ def _be_called(part: str) -> None:
         Path("/proc/self/comm").write_text(f"hfg {part}"[:15])
 
 
-def _sweep(begun: Begun) -> None:
+def _sweep(begun: Instructions) -> None:
     """Remove files left by a main part that was killed; a living one does so itself."""
     if begun.folder and os.getppid() != begun.parent:
-        meeting.remove(Path(begun.folder))
+        rendezvous.remove(Path(begun.folder))
 
 
-def _import(begun: Begun) -> RunError | None:
+def _import(begun: Instructions) -> RunError | None:
     """Import the modules of the main program, for node types in them. Return what went wrong."""
     file = begun.main
     try:
@@ -99,7 +99,7 @@ def _import(begun: Begun) -> RunError | None:
     return None
 
 
-async def _beat(session: Session, begun: Begun) -> None:
+async def _beat(session: Session, begun: Instructions) -> None:
     """Say again and again that this loop goes round."""
     publisher = session.publisher(begun.beat, Traffic.ACKNOWLEDGEMENTS)  # one left out could cost this process its life
     with contextlib.suppress(TransportError):
@@ -134,7 +134,7 @@ class _ToMain(logging.Handler):
             self.handleError(record)
 
 
-async def _serve(begun: Begun, problem: RunError | None) -> None:
+async def _serve(begun: Instructions, problem: RunError | None) -> None:
     task = asyncio.current_task()
     assert task is not None
     stop = partial(asyncio.get_running_loop().call_soon_threadsafe, task.cancel)
@@ -148,7 +148,7 @@ async def _serve(begun: Begun, problem: RunError | None) -> None:
                 raise problem
             return build_graph(message, beside=beside)
 
-        worker = Worker(session, begun.run, begun.part, begun.lives, build, near=near)
+        worker = Worker(session, begun.run, begun.part, begun.incarnations, build, near=near)
         handler = _ToMain(asyncio.get_running_loop(), worker.log, begun.level)
         logging.getLogger().addHandler(handler)
         logging.getLogger().setLevel(begun.level)
@@ -163,7 +163,7 @@ async def _serve(begun: Begun, problem: RunError | None) -> None:
             await one.close()
 
 
-def _watch(stop: Callable[[], object], begun: Begun) -> None:
+def _watch(stop: Callable[[], object], begun: Instructions) -> None:
     """End the process when the input ends: at first as it should, with teardowns, and then in any case."""
     os.read(sys.stdin.fileno(), 1)
     with contextlib.suppress(RuntimeError):  # it ends already

@@ -50,7 +50,7 @@ from hfg.parts.model.messages import (
     Told,
     Untrue,
 )
-from hfg.parts.model.sieve import sieve
+from hfg.parts.model.trace_filter import trace_filter
 from hfg.parts.running.channels import Channel, called
 from hfg.parts.running.checkpointing import Checkpointer, read
 from hfg.parts.running.part import Part
@@ -59,10 +59,10 @@ from hfg.parts.running.rings import sweep_run
 from hfg.parts.steering.serving import Serving
 from hfg.transport import Session
 
-__all__ = ["FIRST_LIFE", "Worker"]
+__all__ = ["FIRST_INCARNATION", "Worker"]
 
 _LOGGER = Log("hfg.parts")
-FIRST_LIFE = 1
+FIRST_INCARNATION = 1
 _MOST_RECORDS = 1000  # waiting to be sent
 _ROUNDS = 8  # times that the time is asked for before the nodes are set up
 _ASKS_EVERY_S = 5.0
@@ -76,7 +76,7 @@ class Worker:
       session: session of the transport.
       run: the name by which all parts know the run.
       name: name of the part.
-      lives: its incarnation, and that of the main part.
+      incarnations: its incarnation, and that of the main part.
       build: makes the graph from the received text.
       near: the session that reaches parts on the same host; None if `session` does.
     """
@@ -86,7 +86,7 @@ class Worker:
         session: Session,
         run: str,
         name: str,
-        lives: tuple[int, int],
+        incarnations: tuple[int, int],
         build: Callable[[Open], Graph],
         *,
         near: Session | None = None,
@@ -95,11 +95,11 @@ class Worker:
         self._near = near or session
         self._run = run
         self._name = name
-        self._life = lives[0]
+        self._incarnation = incarnations[0]
         self._build = build
         self._inbox: asyncio.Queue[Message] = asyncio.Queue()
-        self._channels = {MAIN: Channel(session, run, name, MAIN, lives, self._inbox.put_nowait)}
-        self._lives: dict[str, int] = {}  # of neighbours
+        self._channels = {MAIN: Channel(session, run, name, MAIN, incarnations, self._inbox.put_nowait)}
+        self._incarnations: dict[str, int] = {}  # of neighbours
         self._has_begun = False
         self._asked = 0  # number of requests for the time without an answer
         self._part: Part | None = None
@@ -204,23 +204,23 @@ class Worker:
             inherits=self._name in inheriting(cutting),
             inherited=inherited(cutting),
             remembered=remembered(cutting),
-            returns=self._life > message.incarnations[MAIN],
+            returns=self._incarnation > message.incarnations[MAIN],
             keeper=keeper,
         )
         self._serving = Serving(graph, flat, composition, partial(self._say, MAIN), part.emptied)
         level_of(graph).whole.begin_run(self._serving.run)
-        composition.consumers.leave_out(sieve(self._name, edges))
+        composition.consumers.leave_out(trace_filter(self._name, edges))
         part.engine.callbacks.finished.append(partial(self._ended, part))
-        lives = message.incarnations
+        incarnations = message.incarnations
         neighbours = {edge.source for edge in edges} | {edge.target for edge in edges}
         for other in neighbours - {self._name, MAIN}:
-            self._channels[other] = self._channel_to(part, other, lives[other])
+            self._channels[other] = self._channel_to(part, other, incarnations[other])
         self._carrier = PartLinks(
             part,
             self._session,
             self._near,
             self._run,
-            lives,
+            incarnations,
             edges,
             self._say,
             remembered(cutting),
@@ -238,21 +238,21 @@ class Worker:
         keeper.check()
         return keeper
 
-    def _channel_to(self, part: Part, other: str, life: int) -> Channel:
-        self._lives[other] = life
+    def _channel_to(self, part: Part, other: str, incarnation: int) -> Channel:
+        self._incarnations[other] = incarnation
         hear = partial(self._hear, part, other)
-        return Channel(self._session, self._run, self._name, other, (self._life, life), hear)
+        return Channel(self._session, self._run, self._name, other, (self._incarnation, incarnation), hear)
 
     async def _admit(self, part: Part, message: Reborn) -> None:
         """A neighbour has died and is restarted; messages to the one that died are lost."""
-        if message.part not in self._lives or self._carrier is None:
+        if message.part not in self._incarnations or self._carrier is None:
             return  # not a neighbour
-        if message.life <= max(self._lives[message.part], FIRST_LIFE):
-            raise Untrue(f"of life {message.life} of {called(message.part)}, which has had later ones")
+        if message.incarnation <= max(self._incarnations[message.part], FIRST_INCARNATION):
+            raise Untrue(f"of incarnation {message.incarnation} of {called(message.part)}, which has had later ones")
         old = self._channels[message.part]
         await old.close()
-        self._channels[message.part] = self._channel_to(part, message.part, message.life)
-        self._carrier.admit(message.part, message.life)
+        self._channels[message.part] = self._channel_to(part, message.part, message.incarnation)
+        self._carrier.admit(message.part, message.incarnation)
 
     # --- time -------------------------------------------------------------------------------------------------------
 

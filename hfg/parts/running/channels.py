@@ -47,7 +47,7 @@ class Channel:
         run: str,
         here: str,
         there: str,
-        lives: tuple[int, int],
+        incarnations: tuple[int, int],
         receive: Callable[[Message], None],
     ) -> None:
         """Open this end.
@@ -57,7 +57,7 @@ class Channel:
           run: the name by which all parts know the run.
           here: the name of this part.
           there: the name of the other part.
-          lives: the incarnations of both.
+          incarnations: the incarnations of both.
           receive: called with each message; it may raise `Untrue`.
         """
         self._there = there
@@ -66,11 +66,13 @@ class Channel:
         self._receive = receive
         self._waiting: list[Message] = []
         self._is_closed = False
-        there_from_here = f"{run}/{one}/{other}/{lives[0]}.{lives[1]}"
-        here_from_there = f"{run}/{other}/{one}/{lives[1]}.{lives[0]}"
-        self._out = LinkSender(session, there_from_here, epoch=lives[0], window=_WINDOW, released=self._send)
-        self._out.admit(other, lives[1])
-        self._in = LinkReceiver(session, here_from_there, consumer=one, incarnation=lives[0], arrived=self._arrived)
+        there_from_here = f"{run}/{one}/{other}/{incarnations[0]}.{incarnations[1]}"
+        here_from_there = f"{run}/{other}/{one}/{incarnations[1]}.{incarnations[0]}"
+        self._out = LinkSender(session, there_from_here, epoch=incarnations[0], window=_WINDOW, released=self._send)
+        self._out.admit(other, incarnations[1])
+        self._in = LinkReceiver(
+            session, here_from_there, consumer=one, incarnation=incarnations[0], arrived=self._arrived
+        )
 
     @property
     def waiting(self) -> int:

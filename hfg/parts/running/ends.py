@@ -56,7 +56,7 @@ class World(NamedTuple):
     session: Session
     near: Session
     run: str
-    lives: dict[str, int]
+    incarnations: dict[str, int]
     say: Callable[[str, Message], None]
 
     def way_of(self, edge: CutEdge) -> Session:
@@ -74,8 +74,8 @@ class _NearEnd:
     def __init__(self, world: World, edge: CutEdge, other: str) -> None:
         self.other = other
         self._part = world.part
-        self._life = world.lives[world.part.name]
-        self._waits_to_join = self._life > world.lives[other]
+        self._incarnation = world.incarnations[world.part.name]
+        self._waits_to_join = self._incarnation > world.incarnations[other]
         self._edge = edge
         self._key = f"{world.run}/edge/{edge.number}"
         self._codec = _codec_of(edge)
@@ -102,10 +102,10 @@ class OutgoingEnd(_NearEnd):
 
     def __init__(self, world: World, edge: CutEdge) -> None:
         super().__init__(world, edge, edge.target)
-        part, lives = world.part, world.lives
+        part, incarnations = world.part, world.incarnations
         self._loop = asyncio.get_running_loop()
         self._most = _most_under_way(edge)
-        self._known = 0  # the number of the last that had come from former lives
+        self._known = 0  # the number of the last that had come from previous incarnations
         self._aligns = is_synchronous(edge) and part.keeper is None
         self._lending: Lending | None = None
         self._held: deque[EncodedToken] = deque()  # what is not kept yet, and may not leave before it is
@@ -117,17 +117,17 @@ class OutgoingEnd(_NearEnd):
             self._sender = sender = LinkSender(
                 way,
                 self._key,
-                epoch=lives[part.name],
+                epoch=incarnations[part.name],
                 window=self._most,
                 released=self._released,
                 inherits=part.positions(edge.label) is not None,
                 outbox=outbox,
             )
             after = None if outbox is None else outbox.first - 1
-            sender.admit(name_of(edge.target), lives[edge.target], after=after)
+            sender.admit(name_of(edge.target), incarnations[edge.target], after=after)
             part.outlets[edge.label].owe(sender.machine.unfinished)
         else:
-            self._sender = BoundedSender(way, self._key, epoch=lives[part.name])
+            self._sender = BoundedSender(way, self._key, epoch=incarnations[part.name])
 
     def room(self) -> int:
         """See `Outgoing`."""
@@ -221,7 +221,7 @@ class OutgoingEnd(_NearEnd):
 
     def goes_on(self, number: int) -> None:
         """See `Outgoing`."""
-        self._tell(GoesOn(self._edge.label, self._life, number))
+        self._tell(GoesOn(self._edge.label, self._incarnation, number))
 
     def _released(self) -> None:
         if self._lending is not None:
@@ -229,11 +229,11 @@ class OutgoingEnd(_NearEnd):
         label = self._edge.label
         self._part.be_taken(label, self._part.outlets[label].sent - self._unfinished)
 
-    def admit(self, life: int) -> None:
+    def admit(self, incarnation: int) -> None:
         """The consumer is restarted: resend unprocessed tokens, and tell it from where."""
         label, sender = self._edge.label, self._sender
         if isinstance(sender, LinkSender):
-            sender.admit(name_of(self._edge.target), life)
+            sender.admit(name_of(self._edge.target), incarnation)
         self._known = 0  # it has nothing
         if self._lending is not None:
             self._lending.admit()
@@ -246,7 +246,7 @@ class OutgoingEnd(_NearEnd):
         elif not self._part.is_aligned(label):
             (stream, number), done = UNKNOWN, 0
         else:
-            stream, number = self._life, number if stream and number else self._part.begun_at(label) - 1
+            stream, number = self._incarnation, number if stream and number else self._part.begun_at(label) - 1
             outlet.stand_at(number)
             ended = outlet.end_has_left and number > 0 and not self._unfinished
             done = number = number - self._unfinished - ended
@@ -278,7 +278,7 @@ class OutgoingEnd(_NearEnd):
             self._released()
 
     def _ahead_of(self, message: Joins) -> int:
-        """Return how many tokens former lives have kept, and this one sent, that the consumer has not got."""
+        """Return how many tokens previous incarnations have kept, and this one sent, that the consumer has not got."""
         if not isinstance(self._sender, LinkSender):
             return 0
         stream, number = self._sender.machine.position
@@ -294,7 +294,7 @@ class OutgoingEnd(_NearEnd):
         machine = sender.machine
         self._lending = Lending(
             world.run,
-            segment_of(world.run, world.lives[edge.source], edge.number),
+            segment_of(world.run, world.incarnations[edge.source], edge.number),
             edge.label,
             edge.window,
             lambda: machine.unfinished,
@@ -322,17 +322,17 @@ class IncomingEnd(_NearEnd):
 
     def __init__(self, world: World, edge: CutEdge, remembers: bool) -> None:
         super().__init__(world, edge, edge.source)
-        part, lives = world.part, world.lives
+        part, incarnations = world.part, world.incarnations
         self._by_number = part.is_by_number(edge.label)
-        self._done = 0  # of a part with a ledger: how many it has done, through all lives
-        self._count = 0  # of signals: how many have come, through all lives
+        self._done = 0  # of a part with a ledger: how many it has done, through all incarnations
+        self._count = 0  # of signals: how many have come, through all incarnations
         self._laid: deque[int] = deque()  # the numbers of those that have come and are not done
         self._remembers = remembers
         self._awaits_number = False  # a new incarnation of the producer has not yet reported where it resumes
         self._borrowing: Borrowing | None = None
         self._undecoded: deque[Delivery] = deque()
         self._segment = partial(segment_of, world.run, edge=edge.number)
-        self._lent_by = lives[edge.source]
+        self._lent_by = incarnations[edge.source]
         self._before = 0  # tokens of previous incarnations of the producer; for a lossy edge, whose numbers show losses
         self._receiver: LinkReceiver | BoundedReceiver
         way = world.way_of(edge)
@@ -341,16 +341,16 @@ class IncomingEnd(_NearEnd):
                 way,
                 self._key,
                 consumer=name_of(part.name),
-                incarnation=lives[part.name],
+                incarnation=incarnations[part.name],
                 arrived=self._arrived,
                 capacity=_most_under_way(edge),
-                producer=lives[edge.source],
+                producer=incarnations[edge.source],
                 ledger=None if part.keeper is None else part.keeper.position(edge.label),
             )
         else:
             # Tokens are put on the edge at once, which drops by its own policy.
             self._receiver = BoundedReceiver(
-                way, self._key, arrived=self._arrived, capacity=_UNBOUNDED, producer=lives[edge.source]
+                way, self._key, arrived=self._arrived, capacity=_UNBOUNDED, producer=incarnations[edge.source]
             )
 
     def _arrived(self) -> None:
@@ -374,7 +374,7 @@ class IncomingEnd(_NearEnd):
                 token = decode(delivery.metadata, delivery.value, view=view)
             except EncodingError as error:
                 if borrowing is not None and borrowing.is_awaited:
-                    break  # sent to a former life, and this one has not heard of the memory yet
+                    break  # sent to a previous incarnation, and this one has not heard of the memory yet
                 self._fail("brought what it cannot", error)
                 return
             self._undecoded.popleft()
@@ -412,11 +412,11 @@ class IncomingEnd(_NearEnd):
         """See `Incoming`."""
         self._tell(Hears(self._edge.label, hearing, total))
 
-    def admit(self, life: int) -> None:
+    def admit(self, incarnation: int) -> None:
         """The producer is restarted: tell it how much has arrived so far."""
         label, machine = self._edge.label, self._receiver.machine
-        machine.believe(life)
-        self._lent_by = life
+        machine.believe(incarnation)
+        self._lent_by = incarnation
         # the part that would have reported it is gone: count from what has arrived
         if self._waits_to_join and self._undecoded:
             self._before = 1 - self._undecoded[0].position.sequence
@@ -474,9 +474,9 @@ class IncomingEnd(_NearEnd):
         """The producer offers it.
 
         Raises:
-          Untrue: it is not of this life and edge.
+          Untrue: it is not of this incarnation and edge.
         """
-        if message.segment != self._segment(life=self._lent_by):
+        if message.segment != self._segment(incarnation=self._lent_by):
             raise Untrue(f'of shared memory "{message.segment:.200}", which is not that of edge "{self._edge.label}"')
         if self._borrowing is not None:
             self._borrowing.open(message)

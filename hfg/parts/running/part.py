@@ -359,7 +359,9 @@ class Part:
     def _say_lost(self, label: str, inlet: Inlet, count: int) -> None:
         """Tokens of an edge are lost with a process: count them, log it at once, and put it into the report."""
         inlet.count_lost(count)
-        is_own = self._start.get(label, 0) > inlet.received  # the producer has sent them, and former lives lost them
+        is_own = (
+            self._start.get(label, 0) > inlet.received
+        )  # the producer has sent them, and previous incarnations lost them
         whose = self.name if is_own else self._producers[label]
         tokens = "1 token was" if count == 1 else f"{count} tokens were"
         what = f'edge "{label}": {tokens} lost with a process of {called(whose)}'
@@ -461,7 +463,7 @@ class Part:
         self.outlets[label].hear(hearing)
         self.send()
 
-    # --- other lives ------------------------------------------------------------------------------------------------
+    # --- other incarnations ------------------------------------------------------------------------------------------
 
     def follow(self, label: str, total: int, *, is_known: bool, ended: bool) -> None:
         """This incarnation takes the place of others, which have processed so many tokens of an incoming edge.

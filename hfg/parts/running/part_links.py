@@ -29,7 +29,7 @@ class PartLinks:
         session: Session,
         near: Session,
         run: str,
-        lives: dict[str, int],
+        incarnations: dict[str, int],
         edges: list[CutEdge],
         say: Callable[[str, Message], None],
         remembered: frozenset[str] = frozenset(),
@@ -44,7 +44,7 @@ class PartLinks:
           session: the session that reaches all parts.
           near: the session that reaches parts on the same host.
           run: the name by which all parts know the run.
-          lives: the incarnations of all parts.
+          incarnations: the incarnations of all parts.
           edges: the edges between it and others.
           say: sends a message to another part.
           remembered: labels of the edges whose producer remembers the tokens of its previous incarnations.
@@ -55,7 +55,7 @@ class PartLinks:
         self._links: dict[str, OutgoingEnd | IncomingEnd] = {}
         outgoing: dict[str, OutgoingEnd] = {}
         incoming: dict[str, IncomingEnd] = {}
-        world = World(part, session, near, run, lives, say)
+        world = World(part, session, near, run, incarnations, say)
         for edge in edges:
             if edge.source == part.name:
                 self._links[edge.label] = outgoing[edge.label] = OutgoingEnd(world, edge)
@@ -69,16 +69,18 @@ class PartLinks:
         part.connect(outgoing, incoming)
         if part.keeper is not None:
             part.keeper.stand_at(part.inlets, part.outlets, outgoing)
-        for other, life in lives.items() if admits else ():
-            if life > lives[part.name]:
-                self.admit(other, life)
+        for other, incarnation in incarnations.items() if admits else ():
+            if incarnation > incarnations[part.name]:
+                self.admit(other, incarnation)
 
-    def admit(self, other: str, life: int) -> None:
+    def admit(self, other: str, incarnation: int) -> None:
         """Another part has died and is restarted as this incarnation."""
-        _LOGGER.info("%s: %s is back as incarnation %d: its edges resume", called(self._part.name), called(other), life)
+        _LOGGER.info(
+            "%s: %s is back as incarnation %d: its edges resume", called(self._part.name), called(other), incarnation
+        )
         for link in self._links.values():
             if link.other == other:
-                link.admit(life)
+                link.admit(incarnation)
 
     def hear(self, other: str, message: OfAnEdge) -> None:
         """Process a part's message about an edge.

@@ -61,7 +61,7 @@ class Progress:
         self.has_begun = not returns
         self.positions: dict[str, deque[Where]] = {label: deque() for label in self.leaving} if inherits else {}
         self._inheritance = Inheritance(self.coming)
-        self._origin = dict.fromkeys(self.coming, 0)  # how many tokens came to former lives, or were passed over
+        self._origin = dict.fromkeys(self.coming, 0)  # tokens that came to previous incarnations, or were skipped
         self._last: list[RunningNode] = []
         self._before: dict[Any, int] = {}  # what the ends had done when the part was edited last
 

@@ -42,9 +42,9 @@ def segments_of(run: str) -> str:
     return f"hfg-{_REALM}-{run.rpartition('/')[2]}-"
 
 
-def segment_of(run: str, life: int, edge: int) -> str:
+def segment_of(run: str, incarnation: int, edge: int) -> str:
     """Return the name of the ring of an edge; each incarnation of its producer has its own."""
-    return segment_name(_REALM, run.rpartition("/")[2], life, f"edge_{edge}")
+    return segment_name(_REALM, run.rpartition("/")[2], incarnation, f"edge_{edge}")
 
 
 def sweep_run(run: str) -> None:
@@ -194,7 +194,7 @@ class Lending:
 
     def _make(self, size: int) -> None:
         try:
-            sweep_run(self._run)  # a former life of this part may have left a large one
+            sweep_run(self._run)  # a previous incarnation of this part may have left a large one
             slots = max(1 + _SPARE, min(self._slots, _MOST_SLOTS, _LARGEST // size))
             self.ring = Ring(self._segment, slots, size, smallest=_SMALLEST)
             self._most = slots - _SPARE
@@ -221,7 +221,7 @@ class Lending:
     def seen(self, message: Sees) -> None:
         """The consumer has opened what it was offered, or cannot."""
         if (message.segment, message.lane) != (self._segment, self._lane):
-            return  # from a former life
+            return  # from a previous incarnation
         self.is_answered = True
         if message.refused:
             _LOGGER.debug('edge "%s" copies its arrays: %s', self._label, message.refused)

@@ -30,7 +30,7 @@ from hfg.parts.model.failing import as_error
 from hfg.parts.model.messages import Call, Failed, Parcel, Result, Seen, Untrue
 from hfg.parts.steering.crossing import Crossing
 
-__all__ = ["Asking", "Homes", "Standing"]
+__all__ = ["Asking", "Homes", "Subscription"]
 
 _LOGGER = Log("hfg.parts")
 _NOBODY: Final = 0  # the number of calls whose result is ignored
@@ -121,7 +121,7 @@ class Homes:
         return labels.pop() if len(labels) == 1 else ""
 
 
-class Standing:
+class Subscription:
     """A continuing request to other parts, until it is ended here.
 
     Attributes:
@@ -174,7 +174,7 @@ class Asking:
         self._kept: dict[tuple[str, str], Call] = {}  # calls for a part that starts, by part and key
         self._early: dict[str, list[Call]] = {}  # what was asked for before the part was there
         self._waiting: dict[int, tuple[str, Call, asyncio.Future[Any]]] = {}
-        self._standing: dict[int, Standing] = {}
+        self._subscriptions: dict[int, Subscription] = {}
         self._when_gone: list[Callable[[], None]] = []
         self._answers: dict[str, Any] = {}
 
@@ -234,14 +234,14 @@ class Asking:
         """Set a parameter in a part, including its later incarnations."""
         self.keep(part, f"{_PARAMETER}{path}", "set", path=path, parcel=parcel)
 
-    def stand(
+    def subscribe(
         self,
         parts: Iterable[str],
         verb: str,
         seen: Callable[[str, Seen], None],
         ended: Callable[[], None] | None = None,
         **arguments: Any,
-    ) -> Standing:
+    ) -> Subscription:
         """Start a continuing request in some parts.
 
         Args:
@@ -251,22 +251,22 @@ class Asking:
           ended: called when all these parts are over.
           **arguments: of the verb.
         """
-        standing = Standing(next(self._numbers), parts, seen, ended)
-        self._standing[standing.number] = standing
-        for part in sorted(standing.parts):
+        subscription = Subscription(next(self._numbers), parts, seen, ended)
+        self._subscriptions[subscription.number] = subscription
+        for part in sorted(subscription.parts):
             if part not in self._over:
-                standing.waits_for.add(part)
-                self.keep(part, f"standing {standing.number}", verb, number=standing.number, **arguments)
-        if not standing.waits_for and ended is not None:
+                subscription.waits_for.add(part)
+                self.keep(part, f"subscription {subscription.number}", verb, number=subscription.number, **arguments)
+        if not subscription.waits_for and ended is not None:
             ended()
-        return standing
+        return subscription
 
-    def end(self, standing: Standing) -> None:
+    def end(self, subscription: Subscription) -> None:
         """End a continuing request. A second call does nothing."""
-        if self._standing.pop(standing.number, None) is not None:
-            for part in standing.waits_for:
-                self.forget(part, f"standing {standing.number}")
-                self._send(part, Call(_NOBODY, "leave", {"number": standing.number}))
+        if self._subscriptions.pop(subscription.number, None) is not None:
+            for part in subscription.waits_for:
+                self.forget(part, f"subscription {subscription.number}")
+                self._send(part, Call(_NOBODY, "leave", {"number": subscription.number}))
 
     def _send(self, part: str, call: Call) -> None:
         if part in self._open:
@@ -289,13 +289,13 @@ class Asking:
           Untrue: it was not asked, or its message cannot be read.
         """
         if isinstance(message, Seen):
-            standing = self._standing.get(message.number)
-            if standing is None:
+            subscription = self._subscriptions.get(message.number)
+            if subscription is None:
                 return  # it was ended here meanwhile
-            if part not in standing.parts:
+            if part not in subscription.parts:
                 raise Untrue("and was not asked to look")
             try:
-                standing.seen(part, message)
+                subscription.seen(part, message)
             except EncodingError as error:
                 raise Untrue(f"which cannot be read: {error}") from error
             return
@@ -343,11 +343,11 @@ class Asking:
     def over(self, part: str) -> None:
         """The run is over in a part."""
         self._over.add(part)
-        for standing in list(self._standing.values()):
-            if part in standing.waits_for:
-                standing.waits_for.discard(part)
-                if not standing.waits_for and standing.ended is not None:
-                    standing.ended()
+        for subscription in list(self._subscriptions.values()):
+            if part in subscription.waits_for:
+                subscription.waits_for.discard(part)
+                if not subscription.waits_for and subscription.ended is not None:
+                    subscription.ended()
 
     def close(self) -> None:
         """All parts are gone."""

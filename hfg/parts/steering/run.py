@@ -33,7 +33,7 @@ from hfg.graph.flat import MAIN, CutEdge
 from hfg.graph.structure.edge import Edge, PortEnd
 from hfg.nodetypes.node import Node
 from hfg.parts.model.messages import Seen
-from hfg.parts.steering.asking import Asking, Standing
+from hfg.parts.steering.asking import Asking, Subscription
 from hfg.parts.steering.editing import CutEdits, Drawing
 from hfg.ports import EventPort, ParameterPort, Port
 from hfg.trace import Consumer
@@ -79,11 +79,11 @@ class CutRun(Run):
         self._counts: dict[str, Counts] = {}
         self._asked: dict[str, asyncio.Future[Any]] = {}
         self._wanted: list[str] = []
-        self._far_breakpoints: dict[Breakpoint, Standing] = {}
+        self._far_breakpoints: dict[Breakpoint, Subscription] = {}
         self._far_step = False
-        self._heard: dict[EventPort[Any], Standing] = {}
+        self._heard: dict[EventPort[Any], Subscription] = {}
         self._listeners: list[Listener] = []
-        self._tracing: Standing | None = None
+        self._tracing: Subscription | None = None
         composition.pausing.when_hit(self._hit)
         for listener in composition.consumers.listeners:
             self._listen(listener)
@@ -276,13 +276,13 @@ class CutRun(Run):
             self._pausing.pause(point.path)
             self._pause_others(but=part)
 
-        self._far_breakpoints[point] = self._asking.stand(parts, "break_at", seen, place=path)
+        self._far_breakpoints[point] = self._asking.subscribe(parts, "break_at", seen, place=path)
         return point
 
     def _remove(self, point: Breakpoint) -> None:
-        standing = self._far_breakpoints.pop(point, None)
-        if standing is not None:
-            self._asking.end(standing)
+        subscription = self._far_breakpoints.pop(point, None)
+        if subscription is not None:
+            self._asking.end(subscription)
 
     def _hit(self, _: Breakpoint) -> None:
         self._pause_others()
@@ -305,11 +305,11 @@ class CutRun(Run):
             buffer.miss(max(told.count - before - len(told.tokens), 0))
             for parcel in told.tokens:
                 buffer.put(crossing.see(path, parcel))
-            self._asking.tell(part, "more", number=standing.number)
+            self._asking.tell(part, "more", number=subscription.number)
 
         counted: dict[str, int] = {}
-        standing = self._asking.stand(parts - {MAIN}, "tap", seen, buffer.end, place=path, size=buffer.size)
-        looking.append(lambda: self._asking.end(standing))
+        subscription = self._asking.subscribe(parts - {MAIN}, "tap", seen, buffer.end, place=path, size=buffer.size)
+        looking.append(lambda: self._asking.end(subscription))
         if MAIN in parts:
             looking.append(self._parts.taps.look(found, buffer))
         return tap
@@ -323,7 +323,7 @@ class CutRun(Run):
     def _listen(self, listener: Listener) -> None:
         self._listeners.append(listener)
         if self._tracing is None:
-            self._tracing = self._asking.stand(self._asking.others, "trace", self._traced)
+            self._tracing = self._asking.subscribe(self._asking.others, "trace", self._traced)
 
     def _traced(self, _: str, told: Seen) -> None:
         for sight in told.events:
@@ -349,7 +349,7 @@ class CutRun(Run):
             for parcel in told.tokens:
                 event._notify(self._asking.crossing.see(event.path, parcel))
 
-        self._heard[event] = self._asking.stand([home], "tap", seen, event._complete, place=event.path, size=0)
+        self._heard[event] = self._asking.subscribe([home], "tap", seen, event._complete, place=event.path, size=0)
 
     # --- counts -----------------------------------------------------------------------------------------------------
 

@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterable
 from hfg.graph.flat import CutEdge
 from hfg.trace import TokenProcessed, TokenSent, TokenTaken, TraceEvent
 
-__all__ = ["sieve"]
+__all__ = ["trace_filter"]
 
 
-def sieve(part: str, edges: Iterable[CutEdge]) -> Callable[[TraceEvent], bool]:
+def trace_filter(part: str, edges: Iterable[CutEdge]) -> Callable[[TraceEvent], bool]:
     """Return a filter for the trace events that a part reports; each edge between two parts is in both.
 
     The source's part reports sent and processed tokens, the target's part taken ones.

@@ -15,10 +15,10 @@ from msgspec.structs import replace
 from hfg.base.token import END, Token
 from hfg.errors import EncodingError, RunError, TransportError
 from hfg.links import Outbox
-from hfg.links.meeting.end import MOST, End
-from hfg.links.meeting.outbox import KeptValue, OutboxFile
-from hfg.links.meeting.returning import Returning, identity_of
 from hfg.links.offers import key_of, read_introduction, unfit
+from hfg.links.pubsub.end import MOST, End
+from hfg.links.pubsub.outbox import KeptValue, OutboxFile
+from hfg.links.pubsub.returning import Returning, identity_of
 from hfg.links.running import BoundedSender, LinkSender
 from hfg.transport import Closing, EncodedToken, Presence, Session
 

@@ -1,6 +1,6 @@
 """Another part of a run, as seen from the main part: its process, whether it is there, and its final report.
 
-A `Launcher` starts processes, here or on other hosts. Depends on `channels` and `lives`.
+A `Launcher` starts processes, here or on other hosts. Depends on `channels` and `incarnations`.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from collections.abc import Callable, Coroutine, Mapping
 from typing import Any, Protocol
 
 from hfg.errors import HfgError, UsageError
-from hfg.parts.model.lives import Deaths
+from hfg.parts.model.deaths import Deaths
 from hfg.parts.model.messages import Begin, Closed, Message
 from hfg.parts.running.channels import Channel
 from hfg.transport import Session
 
-__all__ = ["Launched", "Launcher", "Other"]
+__all__ = ["Launched", "Launcher", "PeerProcess"]
 
 
 class Launched(Protocol):
@@ -67,14 +67,14 @@ class Launcher(Protocol):
           TransportError: something is missing.
         """
 
-    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Launched:
+    async def launch(self, run: str, part: str, host: str, incarnations: tuple[int, int]) -> Launched:
         """Start a part, which then serves (see `worker`).
 
         Args:
           run: the name by which all parts know the run.
           part: its name.
           host: its host; "" is this one.
-          lives: its incarnation, and that of the main part.
+          incarnations: its incarnation, and that of the main part.
 
         Raises:
           HfgError: it cannot be started; nothing is left of it.
@@ -84,7 +84,7 @@ class Launcher(Protocol):
         """End the session, and everything else that was started."""
 
 
-class Other:
+class PeerProcess:
     """Another part, as seen from the main part.
 
     Attributes:
@@ -129,7 +129,7 @@ class Other:
             self._opened = asyncio.get_running_loop().create_future()
 
     async def wait_opened(self) -> None:
-        """Wait until a life of it is set up.
+        """Wait until a incarnation of it is set up.
 
         Raises:
           HfgError: that has failed.
@@ -230,7 +230,7 @@ class Other:
                 opened.exception()  # possibly nothing awaits it any more
 
     async def bury(self) -> None:
-        """See to it that nothing is left of a life that is over."""
+        """See to it that nothing is left of a incarnation that is over."""
         if self._launched is not None:
             await self._launched.end()
             self._launched = None
@@ -246,7 +246,7 @@ class Other:
         self._returning = asyncio.get_running_loop().create_task(returning, name=f"hfg return of {self.name}")
 
     async def stay_away(self) -> None:
-        """Begin no other life."""
+        """Begin no other incarnation."""
         if self._returning is not None:
             self._returning.cancel()
             await asyncio.wait({self._returning})

@@ -14,12 +14,12 @@ from asyncio.subprocess import PIPE, STDOUT, Process
 from pathlib import Path
 from typing import Final
 
-__all__ = ["PROCESS", "SPARE", "Spares", "start"]
+__all__ = ["PROCESS", "STANDBY", "Standby", "start"]
 
 PROCESS: Final = "hfg.parts.processes.process"
 """The module that serves a part."""
 
-SPARE: Final = "spare"
+STANDBY: Final = "spare"
 """Shown in process listings in place of the name of a group."""
 
 AFTER_S = 2.0
@@ -51,7 +51,7 @@ async def start(name: str, module: str = PROCESS, *, keeps_output: bool = False)
     )
 
 
-class Spares:
+class Standby:
     """Has one spare process at a time.
 
     Args:
@@ -86,7 +86,7 @@ class Spares:
     async def _make(self) -> None:
         surroundings = _surroundings()
         with contextlib.suppress(OSError):  # then there is none, and code that needs a process reports the reason
-            self._spare = await start(SPARE, keeps_output=self._keeps_output)
+            self._spare = await start(STANDBY, keeps_output=self._keeps_output)
             self._surroundings = surroundings
 
     def _end(self, spare: Process) -> None:

@@ -32,10 +32,10 @@ from hfg.parts.hosts.realm import (
 )
 from hfg.transport import Session
 
-__all__ = ["Standing"]
+__all__ = ["Announcement"]
 
 
-class Standing:
+class Announcement:
     """Announces a run and answers for it, until it is closed."""
 
     def __init__(

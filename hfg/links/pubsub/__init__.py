@@ -7,8 +7,8 @@ die and return: a watch over the name reports this within the lease of the trans
 `offers`.
 """
 
-from hfg.links.meeting.outbox import OutboxFile
-from hfg.links.meeting.publication import Absent, Publication, PublicationCounts
-from hfg.links.meeting.subscription import Subscription, SubscriptionCounts
+from hfg.links.pubsub.outbox import OutboxFile
+from hfg.links.pubsub.publication import Absent, Publication, PublicationCounts
+from hfg.links.pubsub.subscription import Subscription, SubscriptionCounts
 
 __all__ = ["Absent", "OutboxFile", "Publication", "PublicationCounts", "Subscription", "SubscriptionCounts"]

@@ -37,16 +37,16 @@ from hfg.parts.hosts.realm import (
     myself,
     named,
 )
-from hfg.parts.processes.other import Launched, Launcher
+from hfg.parts.processes.peer_process import Launched, Launcher
 from hfg.transport import Session
 
 __all__ = ["AgentLauncher", "deployed_as"]
 
 _LOGGER = Log("hfg.parts")
-_STARTS_S: Final = 20.0  # an agent may have to end a former life first
+_STARTS_S: Final = 20.0  # an agent may have to end a previous incarnation first
 _ENDS_S: Final = 8.0
 _AGAIN_S: Final = 0.2
-_FIRST_LIFE: Final = 1
+_FIRST_INCARNATION: Final = 1
 
 _T = TypeVar("_T")
 
@@ -126,13 +126,13 @@ class AgentLauncher:
 
     # --- a part -----------------------------------------------------------------------------------------------------
 
-    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Launched:
-        """See `Launcher`: a first life needs the agent to be there, any other waits for it."""
+    async def launch(self, run: str, part: str, host: str, incarnations: tuple[int, int]) -> Launched:
+        """See `Launcher`: a first incarnation needs the agent to be there, any other waits for it."""
         if not host:
-            return await self._here.launch(run, part, host, lives)
+            return await self._here.launch(run, part, host, incarnations)
         assert self._realm is not None
-        order = Start(run, part, lives, sys.argv, logging.getLogger("hfg").getEffectiveLevel())
-        is_first = lives[0] == _FIRST_LIFE
+        order = Start(run, part, incarnations, sys.argv, logging.getLogger("hfg").getEffectiveLevel())
+        is_first = incarnations[0] == _FIRST_INCARNATION
         while True:
             agent = await self._agent(part, host, FINDS_S if is_first else None)
             try:
@@ -142,7 +142,7 @@ class AgentLauncher:
                     raise
                 await asyncio.sleep(_AGAIN_S)  # it has just gone, which will be reported soon
                 continue
-            return _Abroad(self, agent, order, started.process)
+            return _RemotePart(self, agent, order, started.process)
 
     async def _agent(self, part: str, host: str, within_s: float | None) -> AgentIs:
         assert self._realm is not None
@@ -151,7 +151,7 @@ class AgentLauncher:
         return await self._realm.agent(host, within_s)
 
     def replaced(self, agent: AgentIs) -> bool:
-        """Say whether another life of an agent is there."""
+        """Say whether another incarnation of an agent is there."""
         assert self._realm is not None
         return any(one.incarnation != agent.incarnation for one in self._realm.of(agent.host))
 
@@ -167,14 +167,14 @@ class AgentLauncher:
     ask = _ask
 
 
-class _Abroad:
+class _RemotePart:
     """A part that an agent has started."""
 
     def __init__(self, launcher: AgentLauncher, agent: AgentIs, order: Start, process: int) -> None:
         self.process = process
         self._launcher = launcher
         self._agent = agent
-        self._which = (order.run, order.part, order.lives[0])
+        self._which = (order.run, order.part, order.incarnations[0])
         self._telling: asyncio.Task[Done] | None = None
 
     async def wait(self) -> str:

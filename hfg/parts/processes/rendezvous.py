@@ -25,7 +25,7 @@ from hfg.parts.model.clocks import machine
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["MeetingPlace", "remove"]
+__all__ = ["Rendezvous", "remove"]
 
 _MACHINE: Final = hashlib.blake2b(machine().encode(), digest_size=4).hexdigest()
 _PREFIX: Final = f"hfg-meet-{_MACHINE}-"  # a lock may belong to one machine, and the directory to several
@@ -34,14 +34,14 @@ _SECRET: Final = re.compile(r"secret(-[0-9a-f]+)?")  # made by sessions, next to
 _YOUNG_S: Final = 60.0  # the run of a newer folder may not have locked it yet
 
 
-class MeetingPlace:
+class Rendezvous:
     """The folder of a living run.
 
     Attributes:
       folder: in the directory for temporary files.
     """
 
-    _of_this_process: ClassVar[weakref.WeakSet[MeetingPlace]] = weakref.WeakSet()
+    _of_this_process: ClassVar[weakref.WeakSet[Rendezvous]] = weakref.WeakSet()
 
     def __init__(self) -> None:
         """Make a folder, and remove folders of this user's runs that were killed.

@@ -13,8 +13,8 @@ import msgspec
 
 from hfg.base.token import END, Token
 from hfg.errors import EncodingError, QueueOverflow, TransportError
-from hfg.links.meeting.end import MOST, End
 from hfg.links.offers import Introduction, key_of, read_introduction, unfit
+from hfg.links.pubsub.end import MOST, End
 from hfg.links.running import BoundedReceiver, LinkReceiver
 from hfg.transport import Closing, LinkOverflow, Presence, Session
 
