@@ -116,7 +116,21 @@ class GraphError(HfgError):
 
 
 class ConnectionError(GraphError):  # noqa: A001 - the paper's word; always used as hfg.errors.ConnectionError
-    """An edge was refused; nothing was changed."""
+    """An edge was refused; nothing was changed.
+
+    Attributes:
+      path: the target, if it is known which; "" otherwise.
+      expected: the type that the target expects; "" if the types are not the reason.
+      sent: the type that the source sends.
+      reason: why the two do not fit.
+    """
+
+    def __init__(self, message: str, *, path: str = "", expected: str = "", sent: str = "", reason: str = "") -> None:
+        super().__init__(message)
+        self.path = path
+        self.expected = expected
+        self.sent = sent
+        self.reason = reason
 
 
 class CheckFailed(GraphError):

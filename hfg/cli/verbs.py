@@ -25,7 +25,7 @@ _MODULES: Final[Mapping[str, str]] = {
     **{name: name for name in ("run", "check", "convert", "draw", "nodes", "tap", "record", "play", "info", "recover")},
     **{name: name for name in ("top", "agent")},
     **dict.fromkeys(("deploy", "ps", "logs", "restart", "stop"), "runs"),
-    **{name: name for name in ("new", "keys")},
+    **{name: name for name in ("new", "keys", "studio")},
 }
 
 

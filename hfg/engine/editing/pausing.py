@@ -120,8 +120,8 @@ class Pausing:
         self.paused, self.why = True, why
         self._pause_groups(True)
         engine.core.flags.append("paused")
-        if engine.core.trace is not None:
-            engine.core.trace(RunPaused(engine.now(), why))
+        if engine.core.trace_changes is not None:
+            engine.core.trace_changes(RunPaused(engine.now(), why))
         self._rest()
 
     def resume(self) -> None:
@@ -137,8 +137,8 @@ class Pausing:
         engine = self._engine
         self.paused, self.why = False, ""
         self._pause_groups(False)
-        if engine.core.trace is not None:
-            engine.core.trace(RunResumed(engine.now()))
+        if engine.core.trace_changes is not None:
+            engine.core.trace_changes(RunResumed(engine.now()))
         engine.kick()
 
     def _pause_groups(self, paused: bool) -> None:

@@ -24,6 +24,7 @@ from hfg.engine.observing.consumers import Listener
 from hfg.engine.observing.glance import Glance, glance_at
 from hfg.engine.observing.recorder import RunRecording
 from hfg.engine.observing.report import Report, RunPage
+from hfg.engine.observing.sampling import Sampler
 from hfg.engine.observing.statistics import Statistics
 from hfg.engine.observing.taps import Tap
 from hfg.engine.rules.activity import reset_activity
@@ -197,7 +198,7 @@ class Run:
         self._need_running("nothing will pass there any more")
         return self._parts.taps.add(what, size, max_rate_hz)
 
-    def trace(self, consumer: Consumer, *, size: int | None = None) -> Listener:
+    def trace(self, consumer: Consumer, *, size: int | None = None, changes_only: bool = False) -> Listener:
         """Send every event of the run to a consumer from now on (R7).
 
         Args:
@@ -205,6 +206,8 @@ class Run:
             must be quick. A consumer that raises is logged and removed; the run continues.
           size: number of events to buffer; the function is then called in a thread of its own. An async function always
             has a task and a buffer. A consumer that is too slow loses the oldest events, which are counted as `lost`.
+          changes_only: leave out the events of single tokens, firings and calls, so that the graph runs as fast as
+            without: only activity, parameters, errors, pauses, edits and the ends of nodes are sent.
 
         Returns:
           A listener; its `remove` removes the consumer.
@@ -212,7 +215,7 @@ class Run:
         Raises:
           UsageError: the consumer cannot take events.
         """
-        return self._parts.consumers.add(consumer, size)
+        return self._parts.consumers.add(consumer, size, changes_only=changes_only)
 
     def record(
         self,
@@ -548,6 +551,13 @@ class Run:
         """
         _ = self._parts.measuring
         return glance_at(self._engine)
+
+    def sampler(self) -> Sampler:
+        """Return what samples single nodes and edges of this process many times a second, at next to no cost.
+
+        The first call starts measuring times, as `statistics` does.
+        """
+        return Sampler(self._engine, self._parts.measuring)
 
     async def refresh(self) -> None:
         """Ask the nodes in other processes for their counts, and wait for the answers.

@@ -246,8 +246,8 @@ class Consumers:
         self._sieve = sieve
         self.changed()
 
-    def add(self, consumer: Any, size: int | None = None) -> Listener:
-        """Let a consumer see every event from now on.
+    def add(self, consumer: Any, size: int | None = None, *, changes_only: bool = False) -> Listener:
+        """Let a consumer see every event from now on, or those that have to do with no single token or firing.
 
         Raises:
           UsageError: it cannot take events, or its buffer has no place.
@@ -262,6 +262,7 @@ class Consumers:
             listener = _InThread(consumer, self, size, self._engine)
         else:
             listener = Listener(consumer, self)
+        listener.changes_only = changes_only
         self.join(listener)
         return listener
 

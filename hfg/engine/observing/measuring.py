@@ -2,11 +2,12 @@
 
 Counts exist anyway. Times are measured from the first time somebody asks: the code of the nodes by `meters`, and what
 nodes wait for by looking at all of them, twenty times a second; under a virtual clock whenever time passes, which is
-exact. Stands on `meters` and `statistics`.
+exact. Depends on `meters` and `statistics`.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from time import monotonic
 from typing import Any
@@ -94,6 +95,7 @@ class Measuring:
         self._marks: dict[Any, int] = {}
         self._before: dict[Any, int] = {}
         self._timer: Any = None
+        self._boxes: tuple[deque[Any], ...] = ()
         self._mark_edges()
         self._before = self._marks
         for worker in self._workers():
@@ -116,6 +118,7 @@ class Measuring:
         meter: Meter | None = worker.meter
         if meter is None:
             meter = Meter(worker)
+            meter.boxes = self._boxes
             meter.measure()
             if worker.core.started:
                 specialise(worker)
@@ -144,11 +147,12 @@ class Measuring:
         if monotonic() >= self._fold_at:
             began = monotonic()
             for worker in self._workers():
-                self._fold(worker)
+                self.fold(worker)
             now = monotonic()
             self._fold_at = now + max(_LOOK_EVERY_S, (now - began) / _LOOKS_SHARE)
 
-    def _fold(self, worker: RunningNode) -> Meter:
+    def fold(self, worker: RunningNode) -> Meter:
+        """Sum up what was measured of one since the last look."""
         meter = self._meter(worker)
         meter.fold()
         return meter
@@ -194,6 +198,29 @@ class Measuring:
     def _edges(self) -> Iterator[Any]:
         return iter(self._engine.core.edges)
 
+    def spans(self) -> tuple[float, float, float]:
+        """Return seconds since measuring began on the run's clock and on the machine's, and those that rates are of."""
+        engine = self._engine
+        now = engine.now() if engine.ended_at is None else engine.ended_at
+        return (
+            now - self._began,
+            (self._ended_on_machine or monotonic()) - self._began_on_machine,
+            now - self._before_at,
+        )
+
+    def note_boxes(self, into: deque[Any]) -> None:
+        """Note each firing and call that is measured there, too."""
+        self._set_boxes((*self._boxes, into))
+
+    def forget_boxes(self, into: deque[Any]) -> None:
+        """Note them there no more."""
+        self._set_boxes(tuple(one for one in self._boxes if one is not into))
+
+    def _set_boxes(self, boxes: tuple[deque[Any], ...]) -> None:
+        self._boxes = boxes
+        for worker in self._workers():
+            self._meter(worker).boxes = boxes
+
     # --- the snapshot -----------------------------------------------------------------------------------------------
 
     def snapshot(self) -> Statistics:
@@ -226,7 +253,7 @@ class Measuring:
         )
 
     def _node(self, worker: RunningNode, passed: float, machine: float, over: float) -> tuple[NodeStatistics, float]:
-        meter = self._fold(worker)
+        meter = self.fold(worker)
         busy = meter.busy_s
         pieces = worker.counts.done
         node = NodeStatistics(

@@ -96,6 +96,7 @@ class Meter:
       delays: from the stamp of what a firing or call took to its end.
       waiting: seconds by what the node waited for.
       active: seconds for which it was active.
+      boxes: where each firing and call that is measured is noted, with the time of its end on the run's clock.
       mark, before: firings and calls at the last and the last but one full second, for the rate.
     """
 
@@ -108,6 +109,7 @@ class Meter:
         "_wrapped",
         "active",
         "before",
+        "boxes",
         "busy_s",
         "code",
         "delays",
@@ -127,6 +129,7 @@ class Meter:
         self.delays = Distribution()
         self.waiting: dict[str, float] = {}
         self.active = 0.0
+        self.boxes: tuple[deque[Any], ...] = ()
         self.mark = self.before = worker.counts.done
         self._fresh: list[float] = []
         self._fresh_delays: list[float] = []
@@ -174,6 +177,8 @@ class Meter:
         """
         self.left -= 1
         self._fresh.append(seconds)
+        for boxes in self.boxes:
+            boxes.append((self.worker, self._now(), seconds))
         self._fresh_busy += seconds if busy is None else busy
         if delay is not None:
             self._fresh_delays.append(delay)

@@ -68,6 +68,13 @@ class Tap:
         """How many tokens were not iterated over and never will be."""
         return self._buffer.seen - self._given - len(self._buffer.kept)
 
+    def take(self) -> list[tuple[float, Token[Any]]]:
+        """Return what is kept for the reader without waiting: each token with the seconds at which it passed."""
+        kept = list(self._buffer.kept)
+        self._buffer.kept.clear()
+        self._given += len(kept)
+        return kept
+
     def close(self) -> None:
         """TokenTap no more; the iteration ends behind what is kept. Does nothing the second time."""
         self._detach()

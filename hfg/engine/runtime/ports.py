@@ -48,7 +48,7 @@ def bind(worker: RunningNode) -> None:
 def _show(worker: RunningNode, name: str, value: Any) -> None:
     """R7: a node has set what it alone sets; whoever watches sees it, from a thread in order with what it sends."""
     core = worker.core
-    if core.trace is None:
+    if core.trace_changes is None:
         return
     if core.runtime.on_loop():
         _trace_set(worker, name, value)
@@ -62,8 +62,8 @@ def _show(worker: RunningNode, name: str, value: Any) -> None:
 
 def _trace_set(worker: RunningNode, name: str, value: Any) -> None:
     core = worker.core
-    if core.trace is not None:
-        core.trace(ParameterSet(core.now(), worker.path, name, value))
+    if core.trace_changes is not None:
+        core.trace_changes(ParameterSet(core.now(), worker.path, name, value))
 
 
 def bind_event(worker: RunningNode, name: str) -> RunningEvent:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from types import ModuleType
 
 import msgspec
 
 from hfg.errors import GraphError, Problem, UsageError
 from hfg.graph.checks.checking import check_flat
-from hfg.graph.editing.changes import Change, undo_all
+from hfg.graph.editing.changes import Change, ParameterChange, undo_all
 from hfg.graph.editing.commands import (
     Add,
     ChangeGroup,
@@ -27,6 +28,7 @@ from hfg.graph.editing.commands import (
     Promote,
     Replace,
     SetEdge,
+    SetParameter,
 )
 from hfg.graph.editing.performing import perform
 from hfg.graph.editing.reloading import reloaded
@@ -55,6 +57,23 @@ class Transaction(msgspec.Struct, frozen=True, eq=False):
 
     commands: tuple[Command, ...]
     changes: tuple[Change, ...]
+
+    def joined(self, later: Transaction) -> Transaction:
+        """Return what both did as one; a parameter that both set is set once, because a drag sets it very often."""
+        commands = {_target(command, number): command for number, command in enumerate(self.commands + later.commands)}
+        changes: dict[object, Change] = {}
+        for number, change in enumerate(self.changes + later.changes):
+            key = (change.node, change.name) if isinstance(change, ParameterChange) else number
+            first = changes.get(key)
+            if isinstance(first, ParameterChange) and isinstance(change, ParameterChange):
+                changes[key] = replace(first, after=change.after)
+            else:
+                changes[key] = change
+        return Transaction(tuple(commands.values()), tuple(changes.values()))
+
+
+def _target(command: Command, number: int) -> object:
+    return command.path if isinstance(command, SetParameter) else number
 
 
 def history_of(graph: HasLevel) -> History[Transaction]:

@@ -206,7 +206,11 @@ def _need_types(source: PortEnd, target: TargetEnd) -> None:
     raise errors.ConnectionError(
         f'port types do not fit: "{target.path}" expects {describe(taken)}, '
         f'"{source.path}" sends {describe(sent)} ({reason}); '
-        "put a node between them that converts, or change one of the types"
+        "put a node between them that converts, or change one of the types",
+        path=target.path,
+        expected=describe(taken),
+        sent=describe(sent),
+        reason=reason,
     )
 
 

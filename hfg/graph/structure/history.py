@@ -42,6 +42,12 @@ class History(Generic[Step]):
         self.undone.clear()
         self._by_hand = False
 
+    def join_last(self, join: Callable[[Step, Step], Step]) -> None:
+        """Make one step of the last two: what one gesture did is taken back at once."""
+        assert len(self.done) > 1
+        last = self.done.pop()
+        self.done[-1] = join(self.done[-1], last)
+
     def changed_by_hand(self) -> None:
         """The graph was changed otherwise: taking back what was edited before would not lead back to where it was."""
         if self.done or self.undone:

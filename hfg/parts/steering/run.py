@@ -314,9 +314,9 @@ class CutRun(Run):
             looking.append(self._parts.taps.look(found, buffer))
         return tap
 
-    def trace(self, consumer: Consumer, *, size: int | None = None) -> Listener:
-        """See `Run.trace`. The events of each part come in its order, those of other parts in batches."""
-        listener = super().trace(consumer, size=size)
+    def trace(self, consumer: Consumer, *, size: int | None = None, changes_only: bool = False) -> Listener:
+        """See `Run.trace`. Those of each part come in its order, those of other parts in batches, and of all kinds."""
+        listener = super().trace(consumer, size=size, changes_only=changes_only)
         self._listen(listener)
         return listener
 

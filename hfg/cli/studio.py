@@ -1,0 +1,108 @@
+"""`hfg studio TARGET`: a graph in the browser, to be built, watched and steered. Depends on `target` and the studio."""
+
+from __future__ import annotations
+
+import asyncio
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hfg.cli import show
+from hfg.cli.interrupt import Interrupt
+from hfg.cli.options import AllowOption, ArgOption, DebugOption, ParamOption
+from hfg.cli.settings import set_parameters
+from hfg.cli.target import load_graph
+from hfg.engine import PunctualLoop
+from hfg.errors import TargetError
+from hfg.files.document import SUFFIX
+from hfg.graph import Graph
+
+__all__ = ["studio"]
+
+
+def studio(
+    target: Annotated[
+        str | None,
+        typer.Argument(help="module:graph, file.py, file.py:graph or file.hfg.yaml; default: an empty graph"),
+    ] = None,
+    host: Annotated[str, typer.Option(help="Address to listen at; other than this machine needs TLS.")] = "127.0.0.1",
+    port: Annotated[int | None, typer.Option(help="Port; default: the first free one from 8800.")] = None,
+    run: Annotated[bool, typer.Option("--run", help="Start the graph at once.")] = False,
+    read_only: Annotated[bool, typer.Option("--read-only", help="Pages may look, not change.")] = False,
+    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+    certfile: Annotated[Path | None, typer.Option(help="Certificate for TLS (PEM).")] = None,
+    keyfile: Annotated[Path | None, typer.Option(help="Its private key (PEM).")] = None,
+    insecure: Annotated[bool, typer.Option("--insecure", help="Let other machines in without TLS.")] = False,
+    param: ParamOption = None,
+    arg: ArgOption = None,
+    allow: AllowOption = None,
+    debug: DebugOption = False,
+) -> int:
+    """Build, watch and steer a graph in the browser."""
+    show.set_debug(debug)
+    try:
+        from hfg.studio.serving import Server, StudioDoor
+    except ImportError as error:
+        raise TargetError(f'the studio needs {error.name}: pip install "hfg[studio]"') from None
+    from hfg.studio.project import Project
+    from hfg.studio.studio import Studio
+
+    graph = Graph("graph") if target is None else load_graph(target, arg or [], allow)
+    set_parameters(graph, param or [])
+    file = _file_of(target)
+    folder = Path.cwd() if file is None else file.resolve().parent
+    project = Project(graph, folder, file, allow=allow or (), read=lambda path: load_graph(str(path), [], allow))
+    why = "You may look, not change: the studio was started with --read-only." if read_only else ""
+
+    async def main() -> None:
+        made = Studio(project, read_only=why, target=target or graph.name)
+        server = Server(
+            StudioDoor(asyncio.get_running_loop(), made),
+            host=host,
+            port=port,
+            certfile=None if certfile is None else str(certfile),
+            keyfile=None if keyfile is None else str(keyfile),
+            insecure=insecure,
+        )
+        server.start()
+        show.write(f"{server.address}\n")
+        if browser:
+            webbrowser.open(server.address)
+        try:
+            if run:
+                await made.steering.start(stay=False)
+            await asyncio.Event().wait()
+        finally:
+            await made.close()
+            await server.stop()
+
+    return _until_interrupted(main)
+
+
+def _until_interrupted(main: object) -> int:
+    interrupt = Interrupt.current or Interrupt()
+    interrupt.what = "the studio"
+
+    async def guarded() -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        with interrupt.cancels(task):
+            await main()  # type: ignore[operator]
+
+    try:
+        with asyncio.Runner(loop_factory=PunctualLoop) as runner:
+            runner.run(guarded())
+    except (asyncio.CancelledError, KeyboardInterrupt):
+        if not interrupt.count:
+            raise
+    return 0
+
+
+def _file_of(target: str | None) -> Path | None:
+    """The file that a target names, if it is one."""
+    if target is None:
+        return None
+    place = target.partition(":")[0] if not target.endswith(SUFFIX) else target
+    return Path(place) if place.endswith((SUFFIX, ".yaml", ".yml", ".py")) and Path(place).is_file() else None

@@ -1,0 +1,23 @@
+"""The studio: a graph, at rest or running, that several pages in a browser see and edit at once.
+
+    messages     what a page and the studio say to each other      records     what a page shows, as tables of records
+    describing   a graph as records         tables     what has changed, as numbered patches
+    following    keeps the tables as the graph and its run are     history, words   edits as people read them
+    targets      where an edge may lead, and why not               palette     node types that words and a wire fit
+    viewing      one page: its frames, its subscriptions, its credits
+    topics       what pages subscribe to: activity, measures, values, timeline, log
+    showing      a value for people         logs       log records          conditions  of breakpoints, as data
+    steering     the run: start, pause, steps, breakpoints         failing     what a run failed with
+    layouts      where everything is drawn  clipboard  nodes as text
+    project      the file: open, save, who else has written it     journal     edits that survive a sudden end
+    requests, asking   what a page asks for                        refusing    a refusal as fields
+    studio       all of it together
+    entrance     who may come in            web        the pages' server    serving  its thread and port
+
+All but the last line lives on the loop on which the graph runs and knows nothing of the network, so it needs no extra.
+The server has a thread and a loop of its own: the graph never waits for a page.
+"""
+
+from __future__ import annotations
+
+__all__: list[str] = []

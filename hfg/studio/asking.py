@@ -1,0 +1,152 @@
+"""What a page asks for once: targets of an edge, node types, a value, measures, files. Depends on what answers each."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any, Final
+
+import msgspec
+
+from hfg.graph.structure.level import inside, level_of
+from hfg.graph.structure.pointing import node_at
+from hfg.studio.clipboard import pasted, text_of_nodes
+from hfg.studio.following import Following
+from hfg.studio.palette import search_types, type_of_reference
+from hfg.studio.refusing import Refused
+from hfg.studio.showing import shown_value
+from hfg.studio.targets import targets
+from hfg.studio.topics import node_measures
+
+__all__ = ["ask"]
+
+
+async def ask(host: Following, what: str, args: dict[str, Any]) -> Any:
+    """Answer a question.
+
+    Raises:
+      HfgError: it cannot be answered.
+    """
+    known = _ANSWERS.get(what)
+    if known is None:
+        raise Refused("unknown", f'a page asks for one of {", ".join(_ANSWERS)}, got "{what:.40}"')
+    fields, answer = known
+    try:
+        said = msgspec.convert(args, fields)
+    except msgspec.ValidationError as error:
+        raise Refused("usage", f'"{what}" is asked with {", ".join(fields.__struct_fields__)}: {error}') from None
+    return await answer(host, said)
+
+
+class _Args(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Arguments of a question."""
+
+
+class _Nothing(_Args, frozen=True):
+    pass
+
+
+class _Path(_Args, frozen=True):
+    path: str
+
+
+class _Targets(_Args, frozen=True):
+    port: str
+    moving: str = ""
+
+
+class _Search(_Args, frozen=True):
+    words: str = ""
+    port: str = ""
+    category: str = ""
+    most: int = 50
+
+
+class _Type(_Args, frozen=True):
+    reference: str
+
+
+class _Paths(_Args, frozen=True):
+    paths: list[str]
+
+
+class _Paste(_Args, frozen=True):
+    text: str
+    level: str = ""
+
+
+class _Name(_Args, frozen=True):
+    name: str
+    level: str = ""
+
+
+async def _targets(host: Following, args: _Targets) -> Any:
+    return targets(host.graph, args.port, args.moving)
+
+
+async def _search(host: Following, args: _Search) -> Any:
+    return await search_types(host.graph, args.words, args.port, args.category, min(max(args.most, 1), 1000))
+
+
+async def _type(host: Following, args: _Type) -> Any:
+    return await asyncio.to_thread(type_of_reference, args.reference, host.project.allow)
+
+
+async def _value(host: Following, args: _Path) -> Any:
+    run = host.steering.run
+    if run is None:
+        raise Refused("state", "the graph does not run, so nothing passes there")
+    with run.tap(args.path, size=1) as tap:
+        try:
+            async with asyncio.timeout(_PATIENCE_S):
+                token = await anext(tap)
+        except (TimeoutError, StopAsyncIteration):
+            raise Refused("state", f'nothing has passed "{args.path}" within {_PATIENCE_S:g} s') from None
+    return await asyncio.to_thread(shown_value, token)
+
+
+_PATIENCE_S: Final = 2.0
+
+
+async def _node(host: Following, args: _Path) -> Any:
+    return node_measures(host, args.path)
+
+
+async def _folder(host: Following, args: _Path) -> Any:
+    return host.project.listing(args.path)
+
+
+async def _difference(host: Following, args: _Nothing) -> Any:
+    return host.project.difference()
+
+
+async def _text(host: Following, args: _Paths) -> Any:
+    return {"text": text_of_nodes(host.graph, args.paths)}
+
+
+async def _paste(host: Following, args: _Paste) -> Any:
+    return {"commands": pasted(host.graph, args.text, args.level, host.project.allow)}
+
+
+async def _free_name(host: Following, args: _Name) -> Any:
+    root = level_of(host.graph)
+    level = root if not args.level else inside(node_at(root, args.level))
+    if level is None:
+        raise Refused("unknown", f'"{args.level}" is not a subgraph, so nothing is inside it', args.level)
+    name = re.sub(r"\W+", "_", args.name).strip("_") or "node"
+    return {"name": level.members.free_name(name)[0]}
+
+
+_ANSWERS: Final[Mapping[str, tuple[type[_Args], Callable[[Following, Any], Awaitable[Any]]]]] = {
+    "targets": (_Targets, _targets),
+    "search": (_Search, _search),
+    "type": (_Type, _type),
+    "value": (_Path, _value),
+    "node": (_Path, _node),
+    "folder": (_Path, _folder),
+    "difference": (_Nothing, _difference),
+    "text": (_Paths, _text),
+    "paste": (_Paste, _paste),
+    "free_name": (_Name, _free_name),
+}

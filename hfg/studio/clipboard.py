@@ -1,0 +1,87 @@
+"""Nodes as text, to be pasted into this graph or another one, or sent to another user. Depends on commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+import msgspec
+
+from hfg.errors import GraphError
+from hfg.graph import Graph
+from hfg.graph import commands as c
+from hfg.graph.structure.level import inside, level_of
+from hfg.graph.structure.pointing import node_at
+from hfg.studio.refusing import Refused
+
+__all__ = ["pasted", "text_of_nodes"]
+
+_PATHS: Final = ("path", "source", "target", "by", "inner")
+_LEFT_OUT: Final = (c.AddGroup, c.AddInput, c.AddOutput, c.ChangeGroup)
+
+
+def text_of_nodes(graph: Graph, paths: Iterable[str]) -> str:
+    """Return nodes, and the edges and gates between them, as commands on one line.
+
+    Raises:
+      GraphError: one is not there, or cannot be made by commands.
+    """
+    chosen = set(paths)
+    for path in chosen:
+        node_at(level_of(graph), path)
+    if len({path.rpartition("/")[0] for path in chosen}) > 1:
+        raise Refused("usage", "nodes are copied from one level at a time")
+    kept = [one for one in graph.as_commands() if not isinstance(one, _LEFT_OUT) and _is_within(one, chosen)]
+    return c.encode(kept)
+
+
+def _is_within(command: c.Command, chosen: set[str]) -> bool:
+    said = [getattr(command, name) for name in _PATHS if isinstance(getattr(command, name, None), str)]
+    return bool(said) and all(any(_node_of(one, path) for path in chosen) for one in said)
+
+
+def _node_of(path: str, node: str) -> bool:
+    """Whether a path leads to a node, into it or to a port of it."""
+    return path == node or path.startswith((f"{node}/", f"{node}."))
+
+
+def pasted(graph: Graph, text: str, level: str, allow: Iterable[str]) -> list[Any]:
+    """Return the commands of a text so that they add its nodes at a level, under names that are free there.
+
+    Raises:
+      GraphError: the text holds no commands, or there is no such level.
+    """
+    commands = c.decode(text, allow=allow)
+    around = level_of(graph) if not level else inside(node_at(level_of(graph), level))
+    if around is None:
+        raise GraphError(f'"{level}" is not a subgraph, so nothing is inside it')
+    names: dict[str, str] = {}
+    tops = _tops(commands)
+    taken: set[str] = set()
+    for top in tops:
+        base = top.rpartition("/")[2]
+        name, number = base, 1
+        while name in around.nodes or name in taken:
+            number += 1
+            name = f"{base}_{number}"
+        taken.add(name)
+        names[top] = f"{level}/{name}" if level else name
+    plain = msgspec.json.decode(c.encode([_moved(one, names) for one in commands]))
+    assert isinstance(plain, list)
+    return plain
+
+
+def _tops(commands: Iterable[c.Command]) -> list[str]:
+    """Return the outermost nodes that are added; all others are inside them."""
+    added = [one.path for one in commands if isinstance(one, c.Add | c.AddSubgraph)]
+    return [path for path in added if not any(_node_of(path, other) for other in added if other != path)]
+
+
+def _moved(command: c.Command, names: Mapping[str, str]) -> c.Command:
+    changed = {}
+    for field in _PATHS:
+        said = getattr(command, field, None)
+        for old, new in names.items():
+            if isinstance(said, str) and _node_of(said, old):
+                changed[field] = new + said[len(old) :]
+    return msgspec.structs.replace(command, **changed)

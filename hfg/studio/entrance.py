@@ -1,0 +1,118 @@
+"""Access control: a token once, then a cookie; the right Host against rebinding, the right Origin against other pages.
+
+A page that can create nodes can run code, so the token is worth as much as the user's shell (rule L5). Depends on the
+standard library.
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import secrets
+from collections.abc import Iterable, Mapping
+from typing import Final
+
+from hfg.errors import TargetError
+
+__all__ = ["HEADERS", "Entrance", "is_loopback", "need_guarded"]
+
+HEADERS: Final[Mapping[str, str]] = {
+    "Content-Security-Policy": (
+        "default-src 'self'; script-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; "
+        "connect-src 'self'; worker-src 'self' blob:; font-src 'self'; object-src 'none'; base-uri 'none'; "
+        "form-action 'none'; frame-ancestors 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-cache",
+}
+
+_TOKEN_BYTES: Final = 24
+_LOOPBACK: Final = ("localhost", "127.0.0.1", "[::1]")
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether only this machine can reach a host."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def need_guarded(host: str, *, encrypted: bool, insecure: bool) -> None:
+    """Refuse to be reached from other machines without encryption (rule L5).
+
+    Raises:
+      TargetError: it says what to write.
+    """
+    if is_loopback(host) or encrypted or insecure:
+        return
+    raise TargetError(
+        f"--host {host} lets other machines in, and without encryption whoever listens on the network reads the token, "
+        "with which one can run code here: give --certfile and --keyfile, or go through ssh -L, or write --insecure"
+    )
+
+
+class Entrance:
+    """Checks every request of one server.
+
+    Attributes:
+      token: what the address holds, once.
+      cookie: the name of the cookie; it has the port, because cookies belong to hosts, whatever the port.
+    """
+
+    def __init__(self, host: str, port: int, *, encrypted: bool = False, names: Iterable[str] = ()) -> None:
+        self.token = secrets.token_urlsafe(_TOKEN_BYTES)
+        self.cookie = f"hfg-{port}"
+        self._secret = secrets.token_urlsafe(_TOKEN_BYTES)
+        self._scheme = "https" if encrypted else "http"
+        named = f"[{host}]" if ":" in host else host
+        hosts = {*_LOOPBACK, *names, *(() if _is_any(host) else (named,))}
+        self._hosts = {f"{one}:{port}" for one in hosts} | (hosts if port == (443 if encrypted else 80) else set())
+        self._any_host = _is_any(host) and not names
+        self.encrypted = encrypted
+
+    def is_host(self, host: str) -> bool:
+        """Return whether a request was meant for this server: another name may be rebound to its address."""
+        return host in self._hosts or (self._any_host and _is_address(host))
+
+    def is_origin(self, origin: str | None, host: str) -> bool:
+        """Return whether a page of this very server asks."""
+        return origin == f"{self._scheme}://{host}"
+
+    def is_token(self, token: str) -> bool:
+        """Return whether it is the token of the address."""
+        return hmac.compare_digest(token.encode(), self.token.encode())
+
+    def is_cookie(self, value: str | None) -> bool:
+        """Return whether it is the cookie that the token was exchanged for."""
+        return value is not None and hmac.compare_digest(value.encode(), self._secret.encode())
+
+    def is_bearer(self, authorization: str | None) -> bool:
+        """Return whether a program other than a browser gives the token; then it needs neither cookie nor origin."""
+        kind, _, token = (authorization or "").partition(" ")
+        return kind.lower() == "bearer" and self.is_token(token)
+
+    @property
+    def set_cookie(self) -> str:
+        """The header that gives the cookie."""
+        secure = "; Secure" if self.encrypted else ""
+        return f"{self.cookie}={self._secret}; HttpOnly; SameSite=Strict; Path=/{secure}"
+
+
+def _is_any(host: str) -> bool:
+    return host in ("0.0.0.0", "::", "")
+
+
+def _is_address(host: str) -> bool:
+    """Whether a Host header is a plain address: no name can be rebound to that."""
+    name = host.rsplit(":", 1)[0] if not host.endswith("]") else host
+    try:
+        ipaddress.ip_address(name.strip("[]"))
+    except ValueError:
+        return False
+    return True

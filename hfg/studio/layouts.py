@@ -1,0 +1,174 @@
+"""Where everything is drawn: the layout of each level that a page shows, made off the graph's loop.
+
+Laying out reads the graph, which an edit may change meanwhile: then the result is thrown away, and the layout starts
+over. Depends on the drawing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable
+from typing import Any, Final, Protocol
+
+import msgspec
+
+from hfg.base.logs import Log
+from hfg.graph import Graph
+from hfg.graph.drawing.picture import View, picture
+from hfg.graph.drawing.sheet import sheet
+from hfg.graph.structure.level import Level, inside, level_of
+from hfg.graph.structure.pointing import node_at
+from hfg.studio.tables import Tables
+
+__all__ = ["Layouts", "key_of", "positions"]
+
+_LOGGER: Final = Log("hfg.studio")
+
+
+class _Host(Protocol):
+    tables: Tables
+
+    @property
+    def graph(self) -> Graph: ...
+
+    def take_layout(self, key: str, record: object) -> None: ...
+
+
+def key_of(path: str, view: str) -> str:
+    """Return the key of a layout in its table."""
+    return f"{view}:{path}"
+
+
+class Layouts:
+    """Keeps the layouts that pages want as the graph is."""
+
+    def __init__(self, host: _Host) -> None:
+        self._host = host
+        self._wanted: set[tuple[str, str]] = set()
+        self._made: dict[str, object] = {}  # by key: what the layout depends on
+        self._working: asyncio.Task[None] | None = None
+
+    def want(self, levels: Iterable[tuple[str, str]]) -> None:
+        """These levels are shown, as the graph is now."""
+        self._wanted = set(levels)
+        for key in [key for key in self._made if key not in {key_of(*one) for one in self._wanted}]:
+            del self._made[key]
+            self._host.take_layout(key, None)
+        if self._working is None and self._next() is not None:
+            self._working = asyncio.create_task(self._work(), name="hfg studio layout")
+            self._working.add_done_callback(self._worked)
+
+    def _worked(self, task: asyncio.Task[None]) -> None:
+        self._working = None
+        if not task.cancelled() and task.exception() is not None:
+            _LOGGER.error("a level cannot be laid out", exc_info=task.exception())
+
+    def _next(self) -> tuple[tuple[str, str], object] | None:
+        """Return a level that is not drawn as it is, and what its layout depends on."""
+        for level in sorted(self._wanted):
+            cause = self._cause(level)
+            if self._made.get(key_of(*level)) != cause:
+                return level, cause
+        return None
+
+    def _cause(self, level: tuple[str, str]) -> object:
+        """What a layout depends on: the records of the level."""
+        path, tables = level[0], self._host.tables.of
+        if path and path not in tables["nodes"]:
+            return None
+        nodes = [
+            (one.path, one.type, one.group, one.enabled, one.inside, one.options, one.notes.get("position"), one.ports)
+            for one in tables["nodes"].values()
+            if one.level == path
+        ]
+        edges = [one for one in tables["edges"].values() if one.level == path]
+        return nodes, edges, [one for one in tables["gates"].values() if one.level == path]
+
+    async def _work(self) -> None:
+        while (found := self._next()) is not None:
+            level, cause = found
+            key = key_of(*level)
+            if cause is None:
+                self._made[key] = None
+                self._host.take_layout(key, None)
+                continue
+            try:
+                drawn = await asyncio.to_thread(lay_out, self._host.graph, *level)
+            except Exception:
+                if self._cause(level) == cause:
+                    self._made[key] = cause  # it will not do better the next time
+                    raise
+                continue  # the graph changed while it was read
+            if self._cause(level) == cause:
+                self._made[key] = cause
+                self._host.take_layout(key, drawn)
+
+
+def positions(level: Level) -> dict[str, tuple[float, float]]:
+    """Return where people have put nodes of a level, by path."""
+    found = {}
+    for node in level.nodes.values():
+        place = level.whole.notes.get(node, {}).get("position")
+        if isinstance(place, list | tuple) and len(place) == 2 and all(isinstance(one, int | float) for one in place):
+            found[node.place.path] = float(place[0]), float(place[1])
+    return found
+
+
+def lay_out(graph: Graph, path: str, view: str) -> dict[str, Any]:
+    """Draw one level, its subgraphs closed."""
+    root = level_of(graph)
+    level = root if not path else inside(node_at(root, path))
+    assert level is not None
+    seen = picture(level.face, View(depth=0, all_ports=True))
+    drawn = sheet(seen)
+    places = positions(level)
+    boxes = []
+    for card in drawn.cards:
+        of = card.of
+        x, y = places.get(getattr(of, "path", ""), (card.x, card.y))
+        boxes.append(
+            {
+                "id": getattr(of, "path", "") or f"@{of.name}",
+                "name": of.name,
+                "kind": "subgraph" if getattr(of, "is_folded", False) else "node",
+                "type_name": of.type_name,
+                "group": of.group,
+                "x": x,
+                "y": y,
+                "width": card.width,
+                "height": card.height,
+                "is_state": getattr(of, "is_state", False),
+                "is_active": of.is_active,
+                "is_enabled": of.is_enabled,
+                "is_open": False,
+                "details": list(of.details),
+                "ports": [
+                    {"kind": m.kind, "name": m.name, "x": m.x - card.x + x, "y": m.y - card.y + y, "says": m.name}
+                    for m in card.marks
+                ],
+            }
+        )
+    _ = msgspec
+    return {
+        "title": seen.title,
+        "view": view or "all",
+        "width": drawn.width,
+        "height": drawn.height,
+        "nodes": boxes,
+        "lines": _lines(drawn),
+        "hidden": 0,
+    }
+
+
+def _lines(drawn: Any) -> list[dict[str, Any]]:
+    return [
+        {
+            "kind": "signal" if arrow.is_signal else "data",
+            "is_active": arrow.is_active,
+            "points": way,
+            "edges": [],
+            "says": arrow.said,
+        }
+        for lead in drawn.leads
+        for arrow, way in zip(lead.arrows, lead.ways, strict=True)
+    ]

@@ -1,0 +1,232 @@
+"""The file that a studio edits, inside its folder: open, save, how many edits are not saved, who else has written it.
+
+A file that another program has changed is never overwritten without being asked. Depends on the files' floor and
+`journal`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import time
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from hfg.files import describe, load, save, text_of
+from hfg.files.document import SUFFIX
+from hfg.graph import Graph
+from hfg.graph.editing import Transaction, history_of
+from hfg.studio.journal import Journal
+from hfg.studio.records import FileRecord, JournalOffer
+from hfg.studio.refusing import Refused
+
+__all__ = ["Project"]
+
+_LOOK_EVERY_S: Final = 1.0
+_MOST_FILES: Final = 1000
+_MOST_LINES: Final = 5000
+
+
+class Project:
+    """A graph and where it comes from.
+
+    Attributes:
+      graph: the whole graph.
+      folder: nothing outside of it is opened or written.
+      file: where the graph was read from or written to last; None if it has no file yet.
+      allow: packages that files and commands may import besides.
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        folder: Path,
+        file: Path | None = None,
+        *,
+        allow: Iterable[str] = (),
+        read: Callable[[Path], Graph] | None = None,
+    ) -> None:
+        self.graph = graph
+        self.folder = folder.resolve()
+        self.file = None if file is None else file.resolve()
+        self.allow = tuple(allow)
+        self._read = read or (lambda path: load(path, allow=self.allow))
+        self._saved: Transaction | None = None
+        self._dirty_from_start = 0
+        self._print = self._fingerprint()
+        self._elsewhere = ""
+        self._looked = 0.0
+        self.journal = Journal(self.folder, self.file, self._print)
+
+    # --- what pages see ---
+
+    def record(self) -> FileRecord:
+        """Return the state of the file."""
+        file = self.file
+        offer = self.journal.offer
+        return FileRecord(
+            name=self.graph.name if file is None else file.name,
+            path="" if file is None else str(file.relative_to(self.folder)),
+            folder=self.folder.name,
+            kind="none" if file is None else "yaml" if file.name.endswith(SUFFIX) else "python",
+            changes=self.changes,
+            can_save=file is not None and file.name.endswith(SUFFIX),
+            elsewhere=self._elsewhere,
+            journal=None if offer is None else JournalOffer(*offer),
+        )
+
+    @property
+    def changes(self) -> int:
+        """How many steps the graph is away from what the file says."""
+        history = history_of(self.graph)
+        if self._saved is None:
+            return len(history.done) + self._dirty_from_start
+        if self._saved in history.done:
+            return len(history.done) - 1 - history.done.index(self._saved)
+        if self._saved in history.undone:
+            return len(history.undone) - history.undone.index(self._saved)
+        return len(history.done) + 1
+
+    def look(self) -> None:
+        """See whether another program has written the file; at most once per second."""
+        now = time.monotonic()
+        if now - self._looked < _LOOK_EVERY_S:
+            return
+        self._looked = now
+        self._elsewhere = ""
+        if self.file is not None and self._fingerprint() != self._print:
+            gone = not self.file.exists()
+            what = "was removed" if gone else "was changed on disk by another program"
+            self._elsewhere = f"{self.file.name} {what}. Yours has {_count(self.changes)}."
+
+    def _fingerprint(self) -> str:
+        """Tell contents apart."""
+        try:
+            return "" if self.file is None else hashlib.sha256(self.file.read_bytes()).hexdigest()
+        except OSError:
+            return ""
+
+    # --- reading and writing ---
+
+    def within(self, path: str) -> Path:
+        """Return a path inside the folder.
+
+        Raises:
+          Refused: it leads out of the folder.
+        """
+        if not path or "\0" in path:
+            raise Refused("file", "a file has a name")
+        found = (self.folder / path).resolve()
+        if not found.is_relative_to(self.folder):
+            raise Refused("file", f'"{path}" leads out of the folder "{self.folder.name}", which the studio was given')
+        return found
+
+    def open(self, path: str, *, discard: bool) -> None:
+        """Take another file's graph.
+
+        Raises:
+          Refused: there are unsaved edits, or it is outside of the folder.
+          FileError: it holds no graph.
+        """
+        self._need_saved(discard)
+        file = self.within(path)
+        self._take(self._read(file), file)
+
+    def reread(self) -> None:
+        """Take the file as it is on the disk."""
+        if self.file is None:
+            raise Refused("file", "the graph has no file that could be read again; save it first")
+        self._take(self._read(self.file), self.file)
+
+    def _need_saved(self, discard: bool) -> None:
+        if self.changes and not discard:
+            raise Refused("changed", f"{_count(self.changes)} would be lost; save first, or discard them")
+
+    def _take(self, graph: Graph, file: Path) -> None:
+        self.journal.drop()
+        self.graph, self.file = graph, file
+        self._now_saved()
+        self.journal = Journal(self.folder, self.file, self._print)
+
+    def save(self, path: str, *, force: bool) -> None:
+        """Write the file, or another one.
+
+        Raises:
+          Refused: another program has written it, it exists already, or it is not a graph file.
+          FileError: a file cannot hold part of the graph.
+        """
+        file = self.file if not path else self.within(path)
+        if file is None:
+            raise Refused("file", f'the graph has no file yet: save it under a name that ends in "{SUFFIX}"')
+        if not file.name.endswith(SUFFIX):
+            raise Refused(
+                "file",
+                f'{file.name} is code, which the studio does not write: save under a name that ends in "{SUFFIX}"',
+            )
+        self._looked = 0.0
+        self.look()
+        if not force and file == self.file and self._elsewhere:
+            raise Refused("changed", self._elsewhere)
+        if not force and file != self.file and file.exists():
+            raise Refused("changed", f"{file.name} is there already; overwrite it, or choose another name")
+        save(self.graph, file)
+        self.journal.drop()
+        self.file = file
+        self._now_saved()
+        self.journal = Journal(self.folder, self.file, self._print)
+
+    def _now_saved(self) -> None:
+        done = history_of(self.graph).done
+        self._saved = done[-1] if done else None
+        self._dirty_from_start = 0
+        self._print = self._fingerprint()
+        self._elsewhere = ""
+
+    def take_journal(self, *, take: bool) -> None:
+        """Carry out the edits that were not saved when a studio ended, or drop them."""
+        if take:
+            self.journal.replay(self.graph, self.allow)
+        else:
+            self.journal.drop()
+            self.journal = Journal(self.folder, self.file, self._print)
+
+    def close(self) -> None:
+        """The studio ends; what is not saved stays in the journal."""
+        self.journal.close(keep=self.changes > 0)
+
+    # --- questions ---
+
+    def listing(self, path: str) -> dict[str, Any]:
+        """Return the folders and graph files of a folder."""
+        folder = self.within(path or ".")
+        if not folder.is_dir():
+            raise Refused("file", f'"{path}" is not a folder')
+        entries = sorted(folder.iterdir(), key=lambda one: one.name)[:_MOST_FILES]
+        shown = [one for one in entries if not one.name.startswith(".")]
+        files = [one for one in shown if one.is_file() and one.name.endswith((SUFFIX, ".py", ".mcap"))]
+        return {
+            "path": "" if folder == self.folder else str(folder.relative_to(self.folder)),
+            "folders": [one.name for one in shown if one.is_dir() and not one.name.startswith("__")],
+            "files": [
+                {"name": one.name, "kind": _kind(one), "size": one.stat().st_size, "changed": one.stat().st_mtime}
+                for one in files
+            ],
+        }
+
+    def difference(self) -> list[str]:
+        """Return the difference between the file on the disk and the graph, line by line."""
+        mine = text_of(describe(self.graph, beside=self.file)).splitlines()
+        theirs: Sequence[str] = ()
+        if self.file is not None and self.file.name.endswith(SUFFIX) and self.file.exists():
+            theirs = self.file.read_text(encoding="utf-8", errors="replace").splitlines()
+        name = "new" if self.file is None else self.file.name
+        return list(difflib.unified_diff(theirs, mine, f"{name} (disk)", f"{name} (yours)", lineterm=""))[:_MOST_LINES]
+
+
+def _kind(file: Path) -> str:
+    return "yaml" if file.name.endswith(SUFFIX) else "recording" if file.suffix == ".mcap" else "python"
+
+
+def _count(changes: int) -> str:
+    return "1 change" if changes == 1 else f"{changes} changes"

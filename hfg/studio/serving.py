@@ -1,0 +1,148 @@
+"""The server's thread: its loop is not the graph's, so neither waits for the other. Depends on uvicorn and `web`."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import uvicorn
+
+from hfg.errors import TargetError
+from hfg.studio.entrance import Entrance, need_guarded
+from hfg.studio.messages import LONGEST, FromPage, read
+from hfg.studio.studio import Studio
+from hfg.studio.viewing import Viewer
+from hfg.studio.web import PageOutbox, application
+
+__all__ = ["STATIC", "Server", "StudioDoor"]
+
+STATIC: Final = Path(__file__).with_name("static")
+_PORTS: Final = range(8800, 8900)
+
+
+class _Visit:
+    """One page, seen from the server's thread."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, studio: Studio, viewer: Viewer) -> None:
+        self._loop = loop
+        self._studio = studio
+        self._viewer = viewer
+
+    def say(self, data: str | bytes) -> None:
+        message: FromPage = read(data)
+        self._call(self._studio.receive, self._viewer, message)
+
+    def leave(self) -> None:
+        self._call(self._studio.leave, self._viewer)
+
+    def _call(self, do: Callable[..., object], *arguments: Any) -> None:
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(do, *arguments)
+
+
+class StudioDoor:
+    """Lets pages into a studio on another loop."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, studio: Studio) -> None:
+        self._loop = loop
+        self._studio = studio
+
+    async def enter(self, outbox: PageOutbox) -> _Visit:
+        """See `Door`."""
+
+        async def entered() -> Viewer:
+            return self._studio.enter(outbox)
+
+        viewer = await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(entered(), self._loop))
+        return _Visit(self._loop, self._studio, viewer)
+
+
+class Server:
+    """Serves pages from a thread of its own.
+
+    Attributes:
+      address: what the user opens, with the token.
+    """
+
+    def __init__(
+        self,
+        door: Any,
+        *,
+        host: str = "127.0.0.1",
+        port: int | None = None,
+        certfile: str | None = None,
+        keyfile: str | None = None,
+        insecure: bool = False,
+        names: tuple[str, ...] = (),
+    ) -> None:
+        """Take the port.
+
+        Raises:
+          TargetError: it is in use, or other machines would come in unencrypted.
+        """
+        encrypted = certfile is not None
+        need_guarded(host, encrypted=encrypted, insecure=insecure)
+        self._socket = _listening(host, port)
+        port = self._socket.getsockname()[1]
+        self.entrance = Entrance(host, port, encrypted=encrypted, names=names)
+        shown = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(host, host)
+        shown = f"[{shown}]" if ":" in shown else shown
+        self.address = f"{'https' if encrypted else 'http'}://{shown}:{port}/?token={self.entrance.token}"
+        if shown == socket.gethostname():
+            self.entrance = Entrance(host, port, encrypted=encrypted, names=(*names, shown))
+            self.address = f"{self.address.partition('?')[0]}?token={self.entrance.token}"
+        static = Path(os.environ.get("HFG_STUDIO_STATIC") or STATIC)
+        config = uvicorn.Config(
+            application(door, self.entrance, static),
+            ws="websockets-sansio",
+            ws_max_size=LONGEST,
+            ws_ping_interval=20.0,
+            ws_per_message_deflate=False,
+            log_config=None,
+            access_log=False,
+            lifespan="off",
+            server_header=False,
+            date_header=False,
+            timeout_graceful_shutdown=1,
+            ssl_certfile=certfile,
+            ssl_keyfile=keyfile,
+        )
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(target=self._live, name="hfg studio server", daemon=True)
+
+    def _live(self) -> None:
+        asyncio.run(self._server.serve(sockets=[self._socket]))
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    async def stop(self) -> None:
+        """End, and wait until the server has ended."""
+        self._server.should_exit = True
+        await asyncio.to_thread(self._thread.join, 3.0)
+        self._socket.close()
+
+
+def _listening(host: str, port: int | None) -> socket.socket:
+    """Take the given port, or else the first free one."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    last: OSError | None = None
+    for one in _PORTS if port is None else (port,):
+        listening = socket.socket(family, socket.SOCK_STREAM)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listening.bind((host, one))
+        except OSError as error:
+            listening.close()
+            last = error
+        else:
+            return listening
+    assert last is not None
+    where = f"port {port}" if port is not None else f"every port from {_PORTS.start} to {_PORTS.stop - 1}"
+    raise TargetError(f"{where} of {host} cannot be taken: {last.strerror}; name another one by --port")

@@ -1,0 +1,110 @@
+"""A value for people: one line, its shape, what is small enough as JSON; an image as PNG or JPEG.
+
+Made off the graph's loop, of values that do not change (rule T1). Nothing of what users send can make it fail.
+Depends on the reporting floor's pictures.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+
+from hfg.base.token import Token
+from hfg.engine.observing.encoding import encode, text
+from hfg.reporting.pictures import is_picture, png, smaller
+
+__all__ = ["image_frame", "number_in", "shown_value"]
+
+_MOST_BYTES: Final = 16_384
+_MOST_ELEMENTS: Final = 400
+_SIZE: Final = struct.Struct("<HH")
+
+
+def shown_value(token: Token[Any]) -> dict[str, Any]:
+    """Return what a page shows of a token."""
+    value = token.value
+    found: dict[str, Any] = {
+        "stamp": token.stamp,
+        "number": token.sequence,
+        "activity": token.activity,
+        "kind": _kind(token),
+        "summary": text(value),
+        "data": None,
+        "shape": None,
+        "dtype": None,
+        "message": "",
+    }
+    if isinstance(value, np.ndarray):
+        found["shape"], found["dtype"] = list(value.shape), str(value.dtype)
+        if found["kind"] == "image":
+            return found
+        if value.size > _MOST_ELEMENTS:
+            found["message"] = _too_much(value)
+            return found
+        value = value.tolist()
+    written = encode(value)
+    if len(written) <= _MOST_BYTES:
+        found["data"] = msgspec.Raw(written)
+    else:
+        found["message"] = f"it has {len(written):,} bytes as text, more than is shown at once"
+    return found
+
+
+def _too_much(value: np.ndarray[Any, Any]) -> str:
+    shape = " x ".join(map(str, value.shape))
+    if value.ndim == 3 and value.shape[2] not in (1, 3, 4):
+        return f"This picture cannot be shown: it has {value.shape[2]} channels. Its shape is {shape}."
+    return f"it has {value.size:,} elements, {shape}; a plot of its size or a node that chooses shows more"
+
+
+def _kind(token: Token[Any]) -> str:
+    value = token.value
+    if token.is_marker:
+        return "marker"
+    if value is None:
+        return "none"
+    if isinstance(value, bool | int | float | np.number | np.bool_):
+        return "number"
+    if isinstance(value, str):
+        return "text"
+    if isinstance(value, np.ndarray):
+        return "image" if is_picture(value) else "array"
+    if isinstance(value, list | tuple) and not hasattr(value, "_fields"):
+        return "table" if value and all(isinstance(one, Mapping | tuple | msgspec.Struct) for one in value) else "list"
+    if (
+        isinstance(value, Mapping | msgspec.Struct)
+        or hasattr(value, "_fields")
+        or hasattr(value, "__dataclass_fields__")
+    ):
+        return "record"
+    return "other"
+
+
+def number_in(value: object) -> float | None:
+    """Return a value as a number for a plot; a list or array is its length."""
+    if isinstance(value, bool | int | float | np.number | np.bool_):
+        return float(value)
+    try:
+        return float(len(value))  # type: ignore[arg-type]  # that is what is tried
+    except TypeError:
+        return None
+
+
+def image_frame(value: np.ndarray[Any, Any], size: int, quality: int) -> bytes:
+    """Return an image as a page gets it: width and height of the original, then JPEG, or PNG without OpenCV."""
+    height, width = value.shape[:2]
+    small = smaller(value, size)
+    head = _SIZE.pack(min(width, 0xFFFF), min(height, 0xFFFF))
+    try:
+        import cv2
+    except ImportError:
+        return head + png(small)
+    if small.dtype == np.uint8 and small.ndim in (2, 3) and (small.ndim == 2 or small.shape[2] in (1, 3)):
+        done, data = cv2.imencode(".jpg", np.ascontiguousarray(small), [cv2.IMWRITE_JPEG_QUALITY, quality])
+        if done:
+            return head + bytes(data)
+    return head + png(small)

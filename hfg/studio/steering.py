@@ -1,0 +1,276 @@
+"""The run of a studio: started, ended, held, stepped and edited here; or one that another program has begun.
+
+Everything happens on the graph's loop. Two callbacks report the consequences: the run is in another state, or
+something of it has changed. Depends on the engine.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any, Protocol
+
+import msgspec
+
+from hfg.engine import Run, running
+from hfg.engine.editing.pausing import Breakpoint
+from hfg.errors import HfgError, NotRunning
+from hfg.graph import Graph
+from hfg.graph.editing.commands import Command
+from hfg.studio.conditions import condition_text, holds
+from hfg.studio.failing import error_record
+from hfg.studio.messages import Condition
+from hfg.studio.records import BreakpointRecord, RunRecord
+from hfg.studio.refusing import Refused
+from hfg.trace import RunEnded, RunPaused, RunResumed, TraceEvent
+
+__all__ = ["Follower", "Steering"]
+
+
+class Follower(Protocol):
+    """Receives the changes of a run."""
+
+    def run_changed(self) -> None:
+        """It is in another state, or another run."""
+
+    def run_event(self, event: TraceEvent) -> None:
+        """Something has changed in it that has to do with no single token."""
+
+
+class Steering:
+    """One graph and its runs, one after the other.
+
+    Attributes:
+      graph: the whole graph.
+      run: the current run; None at rest.
+    """
+
+    def __init__(self, graph: Graph, follower: Follower, *, run: Run | None = None, target: str | bool = False) -> None:
+        self.graph = graph
+        self.run: Run | None = None
+        self._follower = follower
+        self._target = target
+        self._own = run is None
+        self._record = RunRecord(steerable=run is None)
+        self._breakpoints: dict[str, tuple[Condition | None, Breakpoint | None]] = {}
+        self._task: asyncio.Task[None] | None = None
+        self._until_stopped: asyncio.Event | None = None
+        self._listener: Any = None
+        self._over = asyncio.Event()
+        if run is not None:
+            self._begun(run)
+
+    # --- from rest to rest ---
+
+    async def start(self, *, stay: bool) -> None:
+        """Let the graph run; return when its nodes are set up.
+
+        Raises:
+          HfgError: it cannot run, or fails as it begins.
+        """
+        if self.run is not None or self._task is not None:
+            raise Refused("state", "the graph runs already; stop it first")
+        if not self._own:
+            raise Refused("state", "the run is over, and belongs to another program: start it there")
+        begun: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._say(state="starting", outcome="", error=None, number=self._record.number + 1, elapsed_s=0.0, why="")
+        self._task = asyncio.create_task(self._live(begun, stay), name="hfg studio run")
+        await begun
+
+    async def _live(self, begun: asyncio.Future[None], stay: bool) -> None:
+        """One run, from its first setup to its last teardown."""
+        failure: HfgError | None = None
+        self._until_stopped = asyncio.Event() if stay else None
+        try:
+            async with running(self.graph, watch=self._target) as run:
+                self._begun(run)
+                begun.set_result(None)
+                if self._until_stopped is not None:
+                    await self._until_stopped.wait()
+                else:
+                    await run.wait_finished()
+        except HfgError as error:
+            failure = error
+        finally:
+            self._ended(failure)
+            self._task = None
+        if not begun.done():
+            begun.set_exception(failure or Refused("state", "the run was stopped as it began"))
+
+    def _begun(self, run: Run) -> None:
+        self.run = run
+        self._over = asyncio.Event()
+        self._listener = run.trace(self._event, changes_only=True)
+        for path, (condition, _) in list(self._breakpoints.items()):
+            with suppress(HfgError):  # there is no such place any more
+                self._breakpoints[path] = condition, self._set_breakpoint(run, path, condition)
+        number = self._record.number if self._own else 1
+        self._say(state="paused" if run.paused else "running", number=number)
+
+    def _ended(self, failure: HfgError | None) -> None:
+        run, self.run = self.run, None
+        outcome = "failed" if failure is not None else "stopped"
+        if run is not None:
+            self._listener.remove()
+            outcome = run.report().outcome
+        elapsed = 0.0 if run is None else run.elapsed()
+        self._breakpoints = {path: (condition, None) for path, (condition, _) in self._breakpoints.items()}
+        error = None if failure is None else error_record(failure)
+        self._say(state="ended", outcome=outcome, elapsed_s=elapsed, why="", error=error)
+        self._over.set()
+
+    def stop(self) -> None:
+        """End the run normally."""
+        run = self._need()
+        self._say(state="stopping")
+        if self._until_stopped is not None:
+            self._until_stopped.set()
+        run.stop()
+
+    async def close(self) -> None:
+        """End a run of the studio's own, and wait for it."""
+        if self._task is not None:
+            task = self._task
+            task.cancel()
+            with suppress(asyncio.CancelledError, HfgError):
+                await task
+        elif self._listener is not None:
+            self._listener.remove()
+
+    # --- while it runs ---
+
+    def _need(self) -> Run:
+        if self.run is None:
+            raise Refused("state", "the graph does not run; start it first")
+        return self.run
+
+    def pause(self) -> None:
+        """Start nothing new."""
+        self._need().pause()
+
+    def proceed(self) -> None:
+        """Go on."""
+        self._need().resume()
+
+    def reset(self) -> None:
+        """Deactivate all nodes and start over."""
+        self._need().reset_activity()
+
+    async def step(self, path: str) -> dict[str, Any]:
+        """One step of a node, or of all; return what moved."""
+        run = self._need()
+        if not run.paused:
+            raise Refused(
+                "state", "the run is not paused, and only a run that stands still makes steps; pause it first"
+            )
+        self._say(state="stepping")
+        try:
+            step = await run.step(path or None)
+        finally:
+            self._stepped(run)
+        return {"moved": list(step.moved), "why_not": step.why_not}
+
+    def _stepped(self, run: Run) -> None:
+        if self.run is run:
+            self._say(state="paused" if run.paused else "running")
+
+    async def trigger(self, path: str, value: object, activity: int | None) -> None:
+        """Send a signal into a slot, or trigger an event."""
+        run = self._need()
+        if activity is not None and activity not in (-1, 0, 1):
+            raise Refused("usage", f"activity is -1, 0 or 1, got {activity}")
+        await run.trigger(path, value, activity=activity)
+
+    # --- edits ---
+
+    async def edit(self, commands: Sequence[Command]) -> None:
+        """Edit the graph, whether it runs or not."""
+        if not await self._in_run(lambda run: run.edit(*commands)):
+            self.graph.edit(*commands)
+
+    async def undo(self) -> None:
+        """Take the last edit back."""
+        if not await self._in_run(lambda run: run.undo()):
+            self.graph.undo()
+
+    async def redo(self) -> None:
+        """Carry out again what was undone."""
+        if not await self._in_run(lambda run: run.redo()):
+            self.graph.redo()
+
+    async def _in_run(self, do: Callable[[Run], Any]) -> bool:
+        """Do it in the run, if there is one, and say so; a run that ends meanwhile leaves it to be done at rest."""
+        run = self.run
+        if run is None:
+            return False
+        try:
+            await do(run)
+        except NotRunning:
+            if not self._own:
+                raise
+            await self._over.wait()
+            return False
+        return True
+
+    # --- breakpoints ---
+
+    def break_at(self, path: str, condition: Condition | None) -> None:
+        """Pause whenever the run comes there, now and in the runs to come."""
+        self.unbreak(path)
+        if self.run is None:
+            if " -> " not in path:
+                _ = self.graph[path]  # a path that leads nowhere is refused at once
+            self._breakpoints[path] = condition, None
+        else:
+            self._breakpoints[path] = condition, self._set_breakpoint(self.run, path, condition)
+        self._follower.run_changed()
+
+    def _set_breakpoint(self, run: Run, path: str, condition: Condition | None) -> Breakpoint:
+        when = None if condition is None else lambda token: holds(condition, token.value)
+        return run.break_at(path, when=when)
+
+    def unbreak(self, path: str) -> None:
+        """Pause there no more."""
+        _, found = self._breakpoints.pop(path, (None, None))
+        if found is not None:
+            found.remove()
+        self._follower.run_changed()
+
+    def breakpoints(self) -> dict[str, BreakpointRecord]:
+        """Return all breakpoints, by path."""
+        why = self._record.why if self._record.state == "paused" else ""
+        return {
+            path: BreakpointRecord(path, 0 if found is None else found.hits, why == path, condition_text(condition))
+            for path, (condition, found) in self._breakpoints.items()
+        }
+
+    # --- what is told ---
+
+    @property
+    def record(self) -> RunRecord:
+        """The state of the run for pages."""
+        return self._record
+
+    def elapsed(self) -> float:
+        """Return seconds since the run began; of a run that is over, how long it took."""
+        return self._record.elapsed_s if self.run is None else self.run.elapsed()
+
+    def _say(self, **changed: Any) -> None:
+        if self.run is not None and "elapsed_s" not in changed:
+            changed["elapsed_s"] = self.run.elapsed()
+        self._record = msgspec.structs.replace(self._record, at=time.time(), **changed)
+        self._follower.run_changed()
+
+    def _event(self, event: TraceEvent) -> None:
+        match event:
+            case RunPaused(why=why):
+                self._say(state="paused", why=why)
+            case RunResumed():
+                if self._record.state != "stepping":
+                    self._say(state="running", why="")
+            case RunEnded(outcome=outcome) if not self._own:
+                self._say(state="ended", outcome=outcome)
+                self.run = None
+        self._follower.run_event(event)

@@ -1,0 +1,205 @@
+"""The studio: one graph, its runs, its file, and all pages that look at it. Everything happens on the graph's loop.
+
+`requests` carries out the requests of pages. Depends on `steering`, `project`, `tables`, `viewing` and `topics`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import time
+from collections.abc import Callable, Coroutine
+from importlib.metadata import version
+from typing import Any, Final
+
+from hfg.base.logs import Log
+from hfg.errors import HfgError
+from hfg.studio.describing import automatic_ports
+from hfg.studio.following import Following
+from hfg.studio.messages import (
+    SUBPROTOCOL,
+    VERSION,
+    FromPage,
+    Hello,
+    Join,
+    Level,
+    Painted,
+    Reject,
+    Request,
+    Subscribe,
+    Unsubscribe,
+    Visible,
+)
+from hfg.studio.project import Project
+from hfg.studio.refusing import reject
+from hfg.studio.requests import answer
+from hfg.studio.steering import Steering
+from hfg.studio.topics import TOPICS, make_topic
+from hfg.studio.viewing import MOST_REQUESTS, MOST_SUBSCRIPTIONS, Outbox, Subscription, Viewer
+
+__all__ = ["Studio"]
+
+_LOGGER: Final = Log("hfg.studio")
+_BEAT_S: Final = 1 / 60
+_MOST_VIEWERS: Final = 32
+_MOST_LEVELS: Final = 64
+
+
+class Studio(Following):
+    """One graph that pages see and edit.
+
+    Attributes:
+      boot: differs for each studio, so that pages know whether their revisions are of this one.
+      read_only: why nothing can be changed; "" if it can.
+    """
+
+    def __init__(self, project: Project, *, read_only: str = "", run: Any = None, target: str | bool = False) -> None:
+        super().__init__(project, Steering(project.graph, self, run=run, target=target))
+        self.boot = os.urandom(8).hex()
+        self.read_only = read_only
+        self._count = 0
+        self._beating: asyncio.TimerHandle | None = None
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    # --- pages ---
+
+    def enter(self, outbox: Outbox) -> Viewer:
+        """A page is there."""
+        self._count += 1
+        viewer = Viewer(self._count, outbox)
+        if len(self.viewers) >= _MOST_VIEWERS:
+            viewer.send_away(1013, f"{_MOST_VIEWERS} pages look at this studio already: close one")
+            return viewer
+        self.viewers[viewer.number] = viewer
+        viewer.send(
+            Hello(
+                v=VERSION,
+                boot=self.boot,
+                viewer=viewer.number,
+                name=self.graph.name,
+                version=version("hfg"),
+                read_only=self.read_only,
+                automatic=automatic_ports(),
+                topics=list(TOPICS),
+                now=time.time(),
+            )
+        )
+        return viewer
+
+    def leave(self, viewer: Viewer) -> None:
+        """A page is gone."""
+        if self.viewers.pop(viewer.number, None) is not None:
+            viewer.leave()
+            self.viewers_changed()
+
+    def receive(self, viewer: Viewer, message: FromPage) -> None:
+        """A page says something."""
+        if viewer.number not in self.viewers:
+            return
+        if not viewer.joined and not isinstance(message, Join):
+            viewer.send_away(1008, f"{SUBPROTOCOL} begins with join")
+            return
+        match message:
+            case Join():
+                self._join(viewer, message)
+            case Subscribe():
+                self._subscribe(viewer, message)
+            case Unsubscribe(sub=sub):
+                viewer.unsubscribe(sub)
+            case Painted(sub=sub, seq=seq):
+                if (subscription := viewer.subscriptions.get(sub)) is not None:
+                    subscription.painted(seq)
+            case Visible(on=on):
+                viewer.visible = on
+            case Level(path=path, open=is_open, view=view):
+                self._level(viewer, (path, view), is_open)
+            case Request():
+                self._request(viewer, message)
+
+    def _join(self, viewer: Viewer, message: Join) -> None:
+        missing = self.tables.since(message.rev) if message.boot == self.boot else None
+        viewer.levels.add(("", ""))
+        if not self.tables.of["studio"]:
+            self.refresh_all()
+        if missing is None:
+            viewer.send(self.tables.snapshot())
+        else:
+            for patch in missing:
+                viewer.send(patch)
+        viewer.joined = True
+        self.viewers_changed()
+        self.layouts_wanted()
+        self.check_soon()
+
+    def _level(self, viewer: Viewer, level: tuple[str, str], is_open: bool) -> None:
+        if is_open and len(viewer.levels) < _MOST_LEVELS:
+            viewer.levels.add(level)
+        else:
+            viewer.levels.discard(level)
+        self.layouts_wanted()
+
+    # --- streams ---
+
+    def _subscribe(self, viewer: Viewer, message: Subscribe) -> None:
+        is_new = message.sub not in viewer.subscriptions
+        if is_new and len(viewer.subscriptions) >= MOST_SUBSCRIPTIONS:
+            viewer.unsubscribe(message.sub, f"a page has {MOST_SUBSCRIPTIONS} subscriptions at most")
+            return
+        try:
+            topic = make_topic(self, message.topic, message.args)
+        except HfgError as error:
+            viewer.unsubscribe(message.sub, str(error))
+            return
+        viewer.subscribe(Subscription(message.sub, topic, message.hz))
+        if self._beating is None:
+            self._beat()
+
+    def _beat(self) -> None:
+        """Send what is new. Without subscriptions there is no beat."""
+        loop = asyncio.get_running_loop()
+        self._beating = None
+        if any(viewer.subscriptions for viewer in self.viewers.values()):
+            self._beating = loop.call_later(_BEAT_S, self._beat)
+        for viewer in list(self.viewers.values()):
+            viewer.beat(loop.time())
+
+    # --- requests ---
+
+    def _request(self, viewer: Viewer, message: Request) -> None:
+        if viewer.pending >= MOST_REQUESTS:
+            viewer.send(Reject(message.id, "busy", f"{MOST_REQUESTS} requests of this page wait for an answer already"))
+            return
+        viewer.pending += 1
+        self._begin(self._answer(viewer, message))
+
+    async def _answer(self, viewer: Viewer, message: Request) -> None:
+        try:
+            viewer.send(await answer(self, viewer, message))
+        except HfgError as error:
+            viewer.send(reject(message.id, error))
+        except Exception as error:
+            _LOGGER.error("the studio could not carry out %r", type(message).__name__, exc_info=error)
+            viewer.send(reject(message.id, error))
+        finally:
+            viewer.pending -= 1
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work, name="hfg studio")
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def in_background(self, make: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Start a task that runs on its own."""
+        self._begin(make())
+
+    async def close(self) -> None:
+        """The studio ends: send the pages away, end its own run."""
+        for viewer in list(self.viewers.values()):
+            viewer.send_away(1001, "the studio has ended")
+            self.leave(viewer)
+        if self._beating is not None:
+            self._beating.cancel()
+        for task in list(self._tasks):
+            task.cancel()
+        await self.steering.close()
+        self.project.close()
