@@ -20,7 +20,7 @@ from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.pointing import node_at
 from hfg.studio.tables import Tables
 
-__all__ = ["Layouts", "key_of", "positions"]
+__all__ = ["Layouts", "key_of", "lay_out", "positions"]
 
 _LOGGER: Final = Log("hfg.studio")
 

@@ -16,7 +16,7 @@ from hfg.studio.refusing import Refused
 from hfg.studio.viewing import Viewer
 from hfg.studio.words import in_words
 
-__all__ = ["answer"]
+__all__ = ["answer", "edit"]
 
 Reply: TypeAlias = m.Ack | m.Answer
 Host: TypeAlias = Following

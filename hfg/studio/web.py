@@ -26,7 +26,7 @@ from hfg.studio.entrance import HEADERS, Entrance
 from hfg.studio.messages import LONGEST, SUBPROTOCOL
 from hfg.studio.viewing import Frame
 
-__all__ = ["Door", "Visit", "application"]
+__all__ = ["Door", "PageOutbox", "Visit", "application"]
 
 _LOGGER: Final = Log("hfg.studio")
 _MOST_FRAMES: Final = 1000
