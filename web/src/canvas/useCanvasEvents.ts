@@ -62,7 +62,7 @@ export function useCanvasEvents(spots: Map<string, Spot>, layout: LayoutRecord |
       change({ selectedEdge: edge });
     },
     onDoubleClick(event: MouseEvent<HTMLElement>) {
-      if (!(event.target as Element).closest(".react-flow__pane")) return;
+      if (!(event.target as Element).classList.contains("react-flow__pane")) return;
       const screen = { x: event.clientX, y: event.clientY };
       openPalette("", screen, flow.screenToFlowPosition(screen));
     },

@@ -16,6 +16,7 @@ export function Timeline() {
 
   useEffect(() => watchTimeline(run), [run]);
   useEffect(() => {
+    if (canvas.current) drawTimeline(canvas.current, true);
     let request = requestAnimationFrame(function frame() {
       if (canvas.current) drawTimeline(canvas.current);
       request = requestAnimationFrame(frame);

@@ -1,5 +1,5 @@
 import { groupClass } from "../state/looking";
-import { isInside, nameOf } from "../state/paths";
+import { nameOf } from "../state/paths";
 import { studio } from "../state/studio";
 import { colour } from "../ui/colours";
 import { percent } from "../ui/words";
@@ -29,9 +29,21 @@ export let scale = { begin: 0, length: 1, width: 1 };
 export const timeAt = (x: number): number => scale.begin + ((x - GUTTER) / (scale.width - GUTTER - RIGHT)) * scale.length;
 export const overviewTimeAt = (x: number): number => ((x - GUTTER) / (scale.width - GUTTER - RIGHT)) * record.now;
 
-export function drawTimeline(canvas: HTMLCanvasElement): void {
+let drawn = "";
+
+/** What the picture depends on: it is drawn again only when that has changed. */
+function stateOf(canvas: HTMLCanvasElement): string {
+  const { follows, length, end } = useWindow.getState();
+  const { selection, theme, activity } = studio();
+  const about = [canvas.clientWidth, canvas.clientHeight, window.devicePixelRatio, follows, length, end, theme, record.turn];
+  return `${about.join()} ${[...selection].join()} ${Object.keys(activity.since).length}`;
+}
+
+export function drawTimeline(canvas: HTMLCanvasElement, again = false): void {
   const context = canvas.getContext("2d");
-  if (!context) return;
+  const state = stateOf(canvas);
+  if (!context || (!again && state === drawn)) return;
+  drawn = state;
   const ratio = window.devicePixelRatio || 1;
   const width = canvas.clientWidth;
   const height = canvas.clientHeight;
@@ -179,7 +191,7 @@ class Drawing {
 
   private isChosen(path: string): boolean {
     if (this.selection.size === 0) return false;
-    return this.selection.has(path) || [...this.selection].some((one) => isInside(path, one));
+    return this.selection.has(path);
   }
 
   private ring(x: number, y: number, width: number, height: number): void {

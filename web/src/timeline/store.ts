@@ -23,10 +23,12 @@ export interface Record {
   open: Open[];
   now: number;
   loads: Map<string, number>;
+  /** Counts what has arrived. */
+  turn: number;
 }
 
 /** What the timeline shows lives outside of React; a frame of the screen draws it. */
-export const record: Record = { boxes: [], spans: [], open: [], now: 0, loads: new Map() };
+export const record: Record = { boxes: [], spans: [], open: [], now: 0, loads: new Map(), turn: 0 };
 
 interface Window {
   follows: boolean;
@@ -44,7 +46,7 @@ let run = -1;
 export function watchTimeline(number: number): () => void {
   if (number !== run) {
     run = number;
-    Object.assign(record, { boxes: [], spans: [], open: [], now: 0, loads: new Map() });
+    Object.assign(record, { boxes: [], spans: [], open: [], now: 0, loads: new Map(), turn: record.turn + 1 });
   }
   watching++;
   subscription ??= socket.subscribe("timeline", {}, 15, (value) => heard(value as Frame));
@@ -66,6 +68,7 @@ function heard(frame: Frame): void {
   for (const span of frame.activity) addSpan(span);
   record.open = frame.open ?? [];
   record.now = frame.now;
+  record.turn++;
   measureLoads();
 }
 
