@@ -64,7 +64,7 @@ export function EdgeFacts({ edge: key }: { edge: string }) {
             />
           </div>
         </div>
-        {edge.through.length > 0 && <p className="mono said">{JSON.stringify(edge.through, null, 1)}</p>}
+        {edge.through && edge.through.length > 0 && <p className="mono said">{JSON.stringify(edge.through, null, 1)}</p>}
       </div>
     </>
   );

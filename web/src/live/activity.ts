@@ -1,8 +1,7 @@
 import { socket } from "../state/link";
-import { edgeKey, isInside, nodeOf } from "../state/paths";
 import { change, studio } from "../state/studio";
 
-type Move = [time: number, path: string, on: boolean, cause: string | null];
+type Move = [time: number, path: string, on: boolean, cause: string | null, via?: string[]];
 
 interface ActivityFrame {
   active: Record<string, number>;
@@ -55,24 +54,5 @@ function sentence(before: Readonly<Record<string, number>>, now: Record<string, 
   return come.length > 0 ? `${come.join(", ")} active` : "";
 }
 
-/** The edges over which activity came: those whose target woke and whose source has just given it away. */
-function waysOf(moves: readonly Move[]): string[] {
-  const { edges } = studio().tables;
-  const found: string[] = [];
-  for (const [, path, on, cause] of moves) {
-    if (!on) continue;
-    if (cause !== null && cause in edges) {
-      found.push(cause);
-      continue;
-    }
-    const gave = moves.filter(([, , other]) => !other).map(([, one]) => one);
-    for (const edge of Object.values(edges)) {
-      const target = nodeOf(edge.target);
-      const source = nodeOf(edge.source);
-      const arrives = target === path || isInside(path, target || "\0");
-      const leaves = gave.some((one) => one === source || isInside(one, source || "\0"));
-      if (edge.active && arrives && leaves && source !== target) found.push(edgeKey(edge.source, edge.target));
-    }
-  }
-  return found;
-}
+/** The edges over which activity came, as the studio says. */
+const waysOf = (moves: readonly Move[]): string[] => moves.flatMap(([, , on, , via]) => (on ? (via ?? []) : []));

@@ -41,6 +41,7 @@ export class Socket {
   private readonly subscriptions = new Map<number, Subscription>();
   private nextId = 1;
   private nextSub = 1;
+  private greeted = false;
   private tries = 0;
   private timer = 0;
   lastWord = performance.now();
@@ -59,8 +60,9 @@ export class Socket {
     socket.onclose = (event) => this.closed(event);
   }
 
+  /** Before the studio has greeted nothing may be said. */
   get isOpen(): boolean {
-    return this.socket?.readyState === WebSocket.OPEN;
+    return this.greeted && this.socket?.readyState === WebSocket.OPEN;
   }
 
   send(message: Message): boolean {
@@ -105,6 +107,7 @@ export class Socket {
     switch (message.t) {
       case "hello": {
         this.tries = 0;
+        this.greeted = true;
         this.listener.hello(message);
         const known = this.listener.known();
         const same = known !== null && known.boot === message.boot;
@@ -151,6 +154,7 @@ export class Socket {
   }
 
   private closed(event: CloseEvent): void {
+    this.greeted = false;
     for (const one of this.waiting.values()) one.reject(new Error("The studio went away before it answered."));
     this.waiting.clear();
     this.listener.closed(event.code, event.reason);

@@ -42,7 +42,7 @@ export interface EdgeRecord {
   active: boolean;
   options: Record<string, Data>;
   signal: boolean;
-  through: Data[];
+  through?: Data[];
   back: boolean;
 }
 
@@ -84,10 +84,10 @@ export interface ParameterType {
   low: number | null;
   high: number | null;
   choices: Data[] | null;
-  labels: string[] | null;
-  unit: string;
+  labels: string[];
+  unit: string | null;
   step: number | null;
-  group: string;
+  group: string | null;
   read_only: boolean;
   [more: string]: unknown;
 }

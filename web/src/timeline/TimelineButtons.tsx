@@ -45,9 +45,8 @@ export function TimelineButtons() {
 /** The boxes that the page has, in the trace format of Chrome and Perfetto. */
 function savePerfetto(): void {
   const lanes = [...new Set(record.boxes.map((box) => box[1]))];
-  const events = record.boxes.map(([node, group, begin, end, kind]) => ({
+  const events = record.boxes.map(([node, group, begin, end]) => ({
     name: node,
-    cat: kind,
     ph: "X",
     ts: begin * 1e6,
     dur: (end - begin) * 1e6,

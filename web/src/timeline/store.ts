@@ -1,9 +1,9 @@
 import { create } from "zustand";
 import { socket } from "../state/link";
 
-export type Box = [node: string, group: string, begin: number, end: number, kind: string, outcome: string];
+export type Box = [node: string, group: string, begin: number, end: number];
 export type Span = [node: string, begin: number, end: number | null];
-type Open = [node: string, group: string, begin: number, kind: string];
+type Open = [node: string, group: string, begin: number];
 
 interface Frame {
   boxes: Box[];

@@ -1,9 +1,10 @@
+import type { Data } from "../../protocol/types";
 import { newGesture } from "../../state/actions";
 import { short } from "../../ui/words";
 import type { WidgetProps } from "../Parameter";
 
 export function Choice({ id, type, value, off, bad, set }: WidgetProps) {
-  const options = type.labels ?? type.choices ?? [];
+  const options: Data[] = type.labels.length > 0 ? type.labels : (type.choices ?? []);
   const index = options.findIndex((one) => JSON.stringify(one) === JSON.stringify(value));
   return (
     <div className={`fld wide${bad ? " bad-field" : ""}${off ? " locked" : ""}`}>

@@ -79,7 +79,7 @@ export function Slider({ id, type, value, off, bad, set }: WidgetProps) {
           onKeyDown={key}
           onBlur={commit}
         />
-        {type.unit !== "" && <u>{type.unit}</u>}
+        {type.unit && <u>{type.unit}</u>}
       </div>
     </>
   );
