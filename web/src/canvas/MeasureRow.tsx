@@ -21,7 +21,7 @@ export function MeasureRow({ box, top, missing, failed }: Props) {
   const speed = useRef<HTMLSpanElement>(null);
   const extra = useRef<HTMLDivElement>(null);
   const helper = isHelper(box);
-  const wide = helper ? 56 : isBig(box) ? 64 : 96;
+  const wide = helper ? 56 : isBig(box) ? 64 : Math.min(96, Math.max(40, box.width - 136));
   const tall = helper ? 14 : 16;
 
   useEffect(() => {
@@ -35,6 +35,7 @@ export function MeasureRow({ box, top, missing, failed }: Props) {
       if (speed.current) speed.current.textContent = rate(measure.rate);
       if (extra.current) extra.current.textContent = more(measure);
     };
+    if (canvas.current) drawBars(canvas.current, NOTHING);
     const stop = paintMeasures(box.id, paint);
     const unlisten = onTheme(() => last && paint(last, true));
     return () => {
@@ -64,6 +65,8 @@ export function MeasureRow({ box, top, missing, failed }: Props) {
     </>
   );
 }
+
+const NOTHING: Measure = { state: "idle", active: false, bars: new Float32Array(), count: 0, median: 0, p99: 0, rate: 0, activeShare: 0, busyShare: 0 };
 
 function more(measure: Measure): string {
   const parts = [`99 % ${duration(measure.p99)}`, `active ${percent(measure.activeShare)}`];

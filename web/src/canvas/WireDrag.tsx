@@ -1,5 +1,5 @@
 import { ViewportPortal } from "@xyflow/react";
-import type { Fit } from "../protocol/types";
+import type { Fit, Targets } from "../protocol/types";
 import { isSource } from "../state/actions";
 import { nameOf, nodeOf, portOf } from "../state/paths";
 import { useStudio } from "../state/studio";
@@ -37,7 +37,7 @@ export function WireDrag({ spots, offset }: { spots: Map<string, Spot>; offset: 
   );
 }
 
-function DragLine({ from, targets }: { from: string; targets: { sends: string; counts: { expects: number; takes: number; refuses: number } } | null }) {
+function DragLine({ from, targets }: { from: string; targets: Targets | null }) {
   const name = `${nameOf(nodeOf(from))}.${portOf(from)}`;
   if (!targets) {
     return (
@@ -47,16 +47,16 @@ function DragLine({ from, targets }: { from: string; targets: { sends: string; c
       </div>
     );
   }
-  const { expects, takes, refuses } = targets.counts;
+  const { expects, takes, refused } = targets.counts;
   return (
     <div className="pop dragline" role="status">
       <b style={{ fontWeight: 600 }}>{name}</b>
-      <span className="second">{targets.sends || "a signal"}</span>
+      <span className="second">{targets.sends || targets.expects || "a signal"}</span>
       <span className="num" style={{ color: "var(--you)", fontWeight: 600 }}>
         {expects === 1 ? "1 port expects it" : `${expects} ports expect it`}
       </span>
       <span className="num muted">
-        {takes} more take anything, {refuses} refuse
+        {takes} more take anything, {refused} refuse
       </span>
     </div>
   );

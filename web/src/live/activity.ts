@@ -3,7 +3,7 @@ import { change, studio } from "../state/studio";
 
 type Move = [time: number, path: string, on: boolean, cause: string | null, via?: string[]];
 
-interface ActivityFrame {
+export interface ActivityFrame {
   active: Record<string, number>;
   moves: Move[];
   lost?: number;
@@ -13,6 +13,7 @@ interface ActivityFrame {
 export const PULSE_MS = 240;
 
 const still = window.matchMedia("(prefers-reduced-motion: reduce)");
+const listeners = new Set<(frame: ActivityFrame) => void>();
 const pulses = new Set<(edges: string[]) => void>();
 
 export function onPulse(act: (edges: string[]) => void): () => void {
@@ -20,11 +21,17 @@ export function onPulse(act: (edges: string[]) => void): () => void {
   return () => pulses.delete(act);
 }
 
+/** Every change of activity, in order. */
+export function onActivity(act: (frame: ActivityFrame) => void): void {
+  listeners.add(act);
+}
+
 export function watchActivity(): void {
   socket.subscribe("activity", {}, 30, (value) => heard(value as ActivityFrame));
 }
 
 function heard(frame: ActivityFrame): void {
+  for (const act of listeners) act(frame);
   const ways = waysOf(frame.moves);
   const calm = ways.length === 0 || still.matches || document.hidden;
   const next = { since: frame.active, ways: ways.length > 0 ? new Set(ways) : studio().activity.ways };

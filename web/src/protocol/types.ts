@@ -298,8 +298,9 @@ export interface Fit {
 }
 
 export interface Targets {
-  sends: string;
-  counts: { expects: number; takes: number; refuses: number };
+  sends?: string;
+  expects?: string;
+  counts: { expects: number; takes: number; refused: number };
   ports: Record<string, Fit>;
 }
 

@@ -1,17 +1,13 @@
 import { create } from "zustand";
+import { type ActivityFrame, onActivity } from "../live/activity";
 import { socket } from "../state/link";
 
 export type Box = [node: string, group: string, begin: number, end: number];
 export type Span = [node: string, begin: number, end: number | null];
-type Open = [node: string, group: string, begin: number];
-
 interface Frame {
   boxes: Box[];
-  activity: Span[];
   now: number;
   lost: number;
-  open?: Open[];
-  fresh?: boolean;
 }
 
 /** Boxes that are kept; the oldest go. Spans of activity are few and all stay. */
@@ -20,7 +16,6 @@ const MOST_BOXES = 60_000;
 export interface Record {
   boxes: Box[];
   spans: Span[];
-  open: Open[];
   now: number;
   loads: Map<string, number>;
   /** Counts what has arrived. */
@@ -28,7 +23,7 @@ export interface Record {
 }
 
 /** What the timeline shows lives outside of React; a frame of the screen draws it. */
-export const record: Record = { boxes: [], spans: [], open: [], now: 0, loads: new Map(), turn: 0 };
+export const record: Record = { boxes: [], spans: [], now: 0, loads: new Map(), turn: 0 };
 
 interface Window {
   follows: boolean;
@@ -46,7 +41,7 @@ let run = -1;
 export function watchTimeline(number: number): () => void {
   if (number !== run) {
     run = number;
-    Object.assign(record, { boxes: [], spans: [], open: [], now: 0, loads: new Map(), turn: record.turn + 1 });
+    Object.assign(record, { boxes: [], spans: [], now: 0, loads: new Map(), turn: record.turn + 1 });
   }
   watching++;
   subscription ??= socket.subscribe("timeline", {}, 15, (value) => heard(value as Frame));
@@ -59,25 +54,30 @@ export function watchTimeline(number: number): () => void {
 }
 
 function heard(frame: Frame): void {
-  if (frame.fresh || frame.now < record.now - 1) {
-    record.boxes = [];
-    record.spans = [];
-  }
   for (const box of frame.boxes) record.boxes.push(box);
   if (record.boxes.length > MOST_BOXES) record.boxes = record.boxes.slice(-MOST_BOXES / 2);
-  for (const span of frame.activity) addSpan(span);
-  record.open = frame.open ?? [];
   record.now = frame.now;
   record.turn++;
   measureLoads();
 }
 
-/** A span that was open comes again when it has ended. */
-function addSpan(span: Span): void {
-  const at = record.spans.findLastIndex((one) => one[0] === span[0] && one[1] === span[1]);
-  if (at >= 0) record.spans[at] = span;
-  else record.spans.push(span);
+/** Spans of activity begin and end with its changes; what was active before the page came began when the studio says. */
+function noteActivity(frame: ActivityFrame): void {
+  for (const [time, path, on] of frame.moves) {
+    const open = record.spans.findLast((one) => one[0] === path && one[2] === null);
+    if (on && !open) record.spans.push([path, time, null]);
+    else if (!on && open) open[2] = time;
+  }
+  for (const span of record.spans) {
+    if (span[2] === null && !(span[0] in frame.active)) span[2] = Math.max(span[1], record.now);
+  }
+  for (const [path, since] of Object.entries(frame.active)) {
+    if (!record.spans.some((one) => one[0] === path && one[2] === null)) record.spans.push([path, since, null]);
+  }
+  record.turn++;
 }
+
+onActivity(noteActivity);
 
 const LOAD_S = 5;
 
