@@ -246,16 +246,19 @@ def test_the_walk_sees_every_way_to_import(tmp_path: Path, line: str, sentence: 
 
 
 def fields_of(module: str, name: str) -> set[str]:
-    """Give what a class says in `__slots__` that it keeps."""
+    """Return the fields that a dataclass declares."""
     for one in ast.walk(parsed(HFG[module])):
         if isinstance(one, ast.ClassDef) and one.name == name:
-            slots = next(part for part in one.body if isinstance(part, ast.Assign) and "__slots__" in ast.unparse(part))
-            return set(ast.literal_eval(slots.value))
+            return {part.target.id for part in one.body if isinstance(part, ast.AnnAssign)}  # type: ignore[union-attr]
     raise AssertionError(f"{module} has no class {name}")
 
 
-WORKERS_FIELDS = fields_of("hfg.engine.model.running_node", "RunningNode") - {"path", "index"}
-"""(Many things have a path or an index.)"""
+WORKERS_FIELDS = {
+    field
+    for module, name in (("vertex", "Vertex"), ("node_state", "NodeState"), ("running_node", "RunningNode"))
+    for field in fields_of(f"hfg.engine.model.{module}", name)
+} - {"path", "index", "type", "events", "core"}
+"""Other classes have fields of the names that are left out."""
 EDGES_FIELDS = {"token", "held", "sent", "dropped", "drained", "ended", "live", "working", "deepest", "full", "grown"}
 
 

@@ -16,7 +16,7 @@ import pytest
 
 import hfg
 from hfg.base.token import Token
-from hfg.engine.model.counts import Counts
+from hfg.engine.model.records import Counts
 from hfg.testing.conformance import value_key
 from hfg.testing.plans import GraphPlan
 from hfg.testing.recording import Recorder

@@ -12,7 +12,8 @@ import pytest
 import hfg
 from hfg import commands as c
 from hfg.base.token import Marker
-from hfg.engine.executing.groups import Job, ThreadGroup
+from hfg.engine.executing.groups import ThreadGroup
+from hfg.engine.model import Job
 from hfg.engine.runtime import settings
 from hfg.testing import ReferenceReport, reference_run
 from hfg.testing.plans import GraphPlan

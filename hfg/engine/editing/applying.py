@@ -218,7 +218,7 @@ class _Applying:
             insort(scope.members, worker, key=label)
             self.scopes[scope] = None
         self._list_source(worker, worker.is_source)
-        worker.lie_in(around)
+        worker.enclose(around)
         self._join(worker)
         self.elsewhere[worker] = None
 
@@ -286,7 +286,7 @@ class _Applying:
         if parent is not None:
             parent.children.sort(key=_index)
             self.scopes[parent] = None
-        worker.lie_in(scope.and_around())
+        worker.enclose(scope.and_around())
         self._join(worker)
         self.scopes[scope] = None
         self.elsewhere[worker] = None
@@ -449,7 +449,7 @@ class _Applying:
         gated = {worker: None for gate in core.gates for worker in gate.workers}
         states = {gate.state: None for gate in core.gates}
         for worker in gated:
-            worker.be_ungated()
+            worker.be_gated(None)
         for state in states:
             state.forget_gates()
         core.gates.clear()
@@ -562,7 +562,7 @@ class _Applying:
         for name, event in list(worker.events.items()):
             watched = event.port is not None and event.port._observers
             if not event.edges and is_automatic_event(name) and not watched and worker.node is not None:
-                worker.ask_no_more(event)
+                worker.remove_event(event)
             elif worker.node is not None:
                 ports.bind_event(worker, name)
         if worker.node is not None and worker.scope is None:

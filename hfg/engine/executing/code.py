@@ -17,9 +17,9 @@ from types import CoroutineType
 from typing import Any, Protocol
 
 from hfg.engine.executing.eager_task import EagerTask
-from hfg.engine.executing.groups import Job
 from hfg.engine.executing.virtual import VirtualTimeLoop
-from hfg.engine.model import ConcurrentFiring, Core, RunningEvent, RunningNode
+from hfg.engine.model import ConcurrentFiring, Core, Job, RunningEvent, RunningNode, records
+from hfg.engine.model.contracts import EagerTask as AnyEagerTask
 from hfg.engine.model.core import PENDING
 from hfg.engine.model.current import current_firing, current_task
 from hfg.engine.rules import concurrency, errors
@@ -51,6 +51,14 @@ def answer(waiter: asyncio.Future[Any], value: Any) -> None:
 
 def _nobody_waits(_how_many: int) -> None:
     """Who waits for room is no code of the node."""
+
+
+def _limit_of(worker: RunningNode, firing: ConcurrentFiring | None) -> tuple[float | None, Callable[[], None]]:
+    """Return the time limit of a firing, if it has one, and what happens after it (X2)."""
+    if firing is not None:
+        return firing.limit_s, partial(concurrency.time_out, firing)
+    limited = worker.options is not None and worker.busy == "firing"
+    return worker.options.max_duration_s if limited else None, partial(errors.time_out, worker)
 
 
 class _Pump(Protocol):
@@ -91,7 +99,7 @@ class CodeRunner:
         self.core = core
         self.loop = loop
         self.context = context
-        self.given_up: set[Any] = set()
+        self.given_up: set[AnyEagerTask] = set()
         self.aside: set[asyncio.Task[None]] = set()
         self.came_back = asyncio.Event()
         self.holds = 0
@@ -119,32 +127,42 @@ class CodeRunner:
         self.core.current = None
         return result, None
 
-    def drive(self, worker: RunningNode, coroutine: Any, done: Done) -> None:
+    def drive(self, worker: RunningNode, coroutine: Any, done: Done, firing: ConcurrentFiring | None = None) -> None:
         """See `core.Code`."""
-        eager_task = worker.execution.eager_task
-        if eager_task is None:
-            eager_task = self.eager_task(worker)
-            worker.execution.run_in(eager_task)
-        result, error = self._call(worker, eager_task.start, (coroutine, self.late(worker, done)))
+        concurrent: Any = worker.concurrent
+        if firing is None:
+            eager_task = worker.execution.eager_task
+            if eager_task is None:
+                eager_task = self.eager_task(worker)
+                worker.execution.run_in(eager_task)
+            late = self.late(worker, done)
+        else:
+            eager_task = concurrent.idle.pop() if concurrent.idle else self.eager_task(worker)
+            eager_task.enter(current_firing.set, firing)  # what its code sends is its own
+            late = self._late(worker, done, eager_task, firing)
+        result, error = self._call(worker, eager_task.start, (coroutine, late))
         if result is not PENDING:
+            if firing is not None:
+                concurrent.idle.append(eager_task)
             done(result, error)
             return
-        worker.begin_async()
-        self._limit(worker)
+        if firing is None:
+            worker.begin_async()
+        else:
+            firing.work(eager_task=eager_task)
+        self._limit(worker, firing)
 
     def eager_task(self, worker: RunningNode) -> EagerTask:
-        """Make the dormant task of an async node, in a context that tells whose code runs."""
+        """Make the dormant task of an async node, in a context from which the running node can be found."""
         context = self.context.copy()
         context.run(run_as, worker)
         return EagerTask(self.loop, f"hfg {worker.path}", self.context, context, self._engine.give_way)
 
-    def _limit(self, worker: RunningNode) -> None:
-        """X2: the firing may not take longer than its limit."""
-        options = worker.options
-        if options is not None and options.max_duration_s is not None and worker.busy == "firing":
-            worker.execution.limit(self.core.after(options.max_duration_s, lambda: errors.time_out(worker)))
-
-    # --- several firings of a node at once (F14) --------------------------------------------------------------------
+    def _limit(self, worker: RunningNode, firing: ConcurrentFiring | None) -> None:
+        """Start the time limit of a firing (X2)."""
+        limit_s, time_out = _limit_of(worker, firing)
+        if limit_s is not None:
+            (worker.execution if firing is None else firing).limit(self.core.after(limit_s, time_out))
 
     def execute_concurrent(
         self, firing: ConcurrentFiring, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
@@ -152,99 +170,43 @@ class CodeRunner:
         """See `core.Code`."""
         worker = firing.worker
         if worker.group.threaded and not inspect.iscoroutinefunction(call):
-            self._concurrent_in_thread(firing, call, arguments, done)
+            self._in_thread(worker, call, arguments, done, firing=firing)
             return
         outside = current_firing.set(firing)
         result, error = self._call(worker, call, arguments)
         current_firing.reset(outside)
         if type(result) is CoroutineType or hasattr(result, "__await__"):
-            self.drive_concurrent(firing, result, done)
+            self.drive(worker, result, done, firing)
         else:
             done(result, error)
 
-    def drive_concurrent(self, firing: ConcurrentFiring, coroutine: Any, done: Done) -> None:
-        """See `core.Code`."""
-        worker = firing.worker
-        concurrent: Any = worker.concurrent
-        eager_task = concurrent.lend() or self.eager_task(worker)
-        eager_task.enter(current_firing.set, firing)  # what its code sends is its own
-        late = self._late_concurrent(firing, eager_task, done)
-        result, error = self._call(worker, eager_task.start, (coroutine, late))
-        if result is not PENDING:
-            concurrent.give_back(eager_task)
-            done(result, error)
-            return
-        firing.work(eager_task=eager_task)
-        limit = firing.limit_s
-        if limit is not None:
-            firing.limit(worker.core.after(limit, partial(concurrency.time_out, firing)))
-
-    def _late_concurrent(self, firing: ConcurrentFiring, eager_task: EagerTask, done: Done) -> Done:
-        """What to call when the code of the firing, which waited, is over."""
-
-        def over(result: Any, error: BaseException | None) -> None:
-            if firing.eager_task is eager_task:
-                firing.rest()
-                concurrent: Any = firing.worker.concurrent
-                concurrent.give_back(eager_task)
-            else:
-                self._drop(eager_task)
-            self._tell(done, result, error)
-            self._engine.go_on()
-
-        return over
-
-    def _concurrent_in_thread(
-        self, firing: ConcurrentFiring, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
-    ) -> None:
-        worker = firing.worker
-        group: Any = worker.group
-
-        def in_thread(*arguments: Any) -> Any:
-            current_firing.set(firing)
-            return call(*arguments)
-
-        def back(job: Job) -> None:
-            group.returned(job)
-            if firing.job is job:
-                firing.rest()
-            self._tell(done, job.result, job.error)
-
-        job = Job(worker, back, in_thread, arguments, done)
-        firing.work(job=job)
-        limit = firing.limit_s
-        time_out = partial(concurrency.time_out, firing)
-        if isinstance(self.loop, VirtualTimeLoop):
-            self._hold(job, limit, time_out)
-        elif limit is not None:
-            firing.limit(worker.core.after(limit, time_out))
-        group.submit(job)
-
-    def interrupt_concurrent(self, firing: ConcurrentFiring) -> None:
-        """See `core.Code`."""
-        eager_task, job = firing.rest()
-        if job is not None:
-            self._abandon(job, firing.worker, firing.number)
-        elif eager_task is not None:
-            self._give_up(eager_task)
-
     def late(self, worker: RunningNode, done: Done) -> Done:
         """See `core.Code`."""
-        closing = self.core.over  # a hook of the teardown; what began before the end is not listened to after it
+        return self._late(worker, done, worker.execution.eager_task, None)
+
+    def _late(
+        self, worker: RunningNode, done: Done, eager_task: AnyEagerTask | None, firing: ConcurrentFiring | None
+    ) -> Done:
+        """Return what to call when code of the node, or of one of its firings, has ended after waiting."""
+        closing = self.core.over  # a hook of the teardown; code that began before the end is ignored after it
+        execution = worker.execution
 
         def over(result: Any, error: BaseException | None) -> None:
-            if worker.execution.in_flight and (worker.execution.eager_task is eager_task or eager_task is None):
+            if firing is not None and firing.eager_task is eager_task:
+                firing.rest()
+                concurrent: Any = worker.concurrent
+                concurrent.idle.append(eager_task)
+            elif firing is None and execution.in_flight and eager_task in (execution.eager_task, None):
                 worker.end_async()
-            else:
+            elif eager_task is not None:
                 self._drop(eager_task)
-            self._tell(done, result, error, closing=closing)
+            self._report(done, result, error, closing=closing)
             self._engine.go_on()
 
-        eager_task = worker.execution.eager_task
         return over
 
-    def _tell(self, done: Done, result: Any, error: BaseException | None, *, closing: bool = False) -> None:
-        """Code that waited is over; behind the end of the run nobody listens but the teardown (`closing`)."""
+    def _report(self, done: Done, result: Any, error: BaseException | None, *, closing: bool) -> None:
+        """Code that was in progress has ended; after the end of the run only the teardown needs it (`closing`)."""
         if self.core.over:
             self.came_back.set()
             if not closing:
@@ -254,23 +216,44 @@ class CodeRunner:
         except Exception as fault:
             self._engine.internal_fault(fault)
 
-    def _give_up(self, eager_task: EagerTask) -> None:
-        """X2: nobody listens to this code any more; it is cancelled, and its task let go when it has ended."""
+    def interrupt(
+        self, worker: RunningNode, *, firing: ConcurrentFiring | None = None, amid: RunningNode | None = None
+    ) -> None:
+        """See `core.Code`; `amid`: the node whose call it is, if that is another one of its region."""
+        if firing is not None:
+            eager_task, job = firing.rest()
+        elif not worker.execution.in_flight:
+            return
+        else:
+            eager_task, job = worker.execution.eager_task, worker.execution.job
+            worker.end_async()
+        if job is not None:
+            amid = amid or worker
+            self._abandon(job, amid, amid.counts.firings if firing is None else firing.number)
+        elif eager_task is not None:
+            if firing is None:
+                worker.execution.run_in(None)
+            self._give_up(eager_task)
+
+    def _give_up(self, eager_task: AnyEagerTask) -> None:
+        """Ignore the result of this code (X2). It is cancelled, and its task is dropped when it has ended."""
         self.given_up.add(eager_task)
         eager_task.cancel()
 
-    def _drop(self, eager_task: EagerTask) -> None:
-        """The code that was given up has ended, so its task has nothing to do any more."""
+    def _drop(self, eager_task: AnyEagerTask) -> None:
+        """Code that was given up has ended, so its task has nothing to do any more."""
         if eager_task in self.given_up:
             self.given_up.discard(eager_task)
             eager_task.drop()
 
     def _abandon(self, job: Job, amid: RunningNode, firing: int) -> None:
-        """X2: nobody listens to this job any more, and its group goes on in another thread."""
+        """Ignore the result of this job (X2). Its group continues in another thread."""
         job.disown()
         self._hold_no_more(job)
         group: Any = amid.group
         group.abandon(f'"{amid.path}", firing {firing}', job)
+
+    # --- in threads -------------------------------------------------------------------------------------------------
 
     def execute_wave(
         self, workers: Sequence[RunningNode], call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
@@ -287,31 +270,36 @@ class CodeRunner:
         arguments: tuple[Any, ...],
         done: Done,
         *,
+        firing: ConcurrentFiring | None = None,
         always: bool = False,
     ) -> Job:
         group: Any = worker.group
-        closing = self.core.over
-        worker.begin_async()
+        closing = always or self.core.over
+
+        def of_firing(*arguments: Any) -> Any:
+            current_firing.set(firing)
+            return call(*arguments)
 
         def back(job: Job) -> None:
-            if job is not worker_job:
-                return
             group.returned(job)
-            worker.end_async()
-            if self.core.over:
-                self.came_back.set()
-            if not self.core.over or closing or always:
-                done(job.result, job.error)
+            if firing is None:
+                worker.end_async()
+            elif firing.job is job:
+                firing.rest()
+            self._report(done, job.result, job.error, closing=closing)
 
-        worker_job = Job(worker, back, call, arguments, done)
-        worker.execution.take_job(worker_job)
-        if isinstance(self.loop, VirtualTimeLoop):
-            limit = worker.options.max_duration_s if worker.busy == "firing" else None
-            self._hold(worker_job, limit, partial(errors.time_out, worker))
+        job: Job = records.Job(worker, back, call if firing is None else of_firing, arguments, done)
+        if firing is None:
+            worker.begin_async()
+            worker.execution.take_job(job)
         else:
-            self._limit(worker)
-        group.submit(worker_job)
-        return worker_job
+            firing.work(job=job)
+        if isinstance(self.loop, VirtualTimeLoop):
+            self._hold(job, *_limit_of(worker, firing))
+        else:
+            self._limit(worker, firing)
+        group.submit(job)
+        return job
 
     def _hold(self, job: Job, limit_s: float | None, time_out: Callable[[], None]) -> None:
         """R6: virtual time stands still until the job is back; it has so many real seconds (X2)."""
@@ -379,19 +367,6 @@ class CodeRunner:
         self.aside.add(task)
         task.add_done_callback(self.aside.discard)
 
-    def interrupt(self, worker: RunningNode, *, amid: RunningNode | None = None) -> None:
-        """See `core.Code`; `amid`: whose call it is, if that is another node's of its region."""
-        if not worker.execution.in_flight:
-            return
-        job, eager_task = worker.execution.job, worker.execution.eager_task
-        worker.end_async()
-        if worker.group.threaded:
-            amid = amid or worker
-            self._abandon(job, amid, amid.counts.firings)
-        else:
-            worker.execution.run_in(None)
-            self._give_up(eager_task)
-
     async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
         """Trigger, then wait until no `wait` queue behind the node's events is full (F8)."""
         worker = event.worker
@@ -400,7 +375,7 @@ class CodeRunner:
         own: Any = worker.room.wait if whose_code() is worker else _nobody_waits  # its own waits for us
         if task is not None and task.worker is worker:
             trigger_from_task(event, value, activity, stamp)
-            own = worker.tasks.wait_for_room
+            own = worker.need_tasks().wait_for_room
         else:
             trigger(event, value, activity, stamp)
         while worker.room.full_edges and core.started and not core.over:
@@ -448,7 +423,7 @@ class CodeRunner:
             return  # nothing has come in: the pump must not run because of it, or its turns were a matter of luck
         while box:
             item = box.popleft()
-            if isinstance(item, Job):
+            if isinstance(item, records.Job):
                 self._engine.guard(partial(item.owner, item))
             elif not self.core.over:
                 self._engine.guard(item)
@@ -459,7 +434,7 @@ class CodeRunner:
 
         A job with the signals before it (R6).
         """
-        if not isinstance(item, Job):
+        if not isinstance(item, records.Job):
             self._early_signals.setdefault(id(box), []).append(item)
             return
         signals = self._early_signals.pop(id(box), [])

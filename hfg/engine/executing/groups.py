@@ -14,11 +14,11 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
-from hfg.engine.model import Group, RunningNode
+from hfg.engine.model import Group, Job, RunningNode
 from hfg.engine.model.groups import Policy
 from hfg.errors import UsageError
 
-__all__ = ["CheckedTurn", "Dispatching", "Job", "LoopGroup", "SideGroup", "ThreadGroup", "current_job"]
+__all__ = ["CheckedTurn", "Dispatching", "LoopGroup", "SideGroup", "ThreadGroup", "current_job"]
 
 
 _DISPATCH_STEPS = 16  # how much one group may do on the loop before others have their turn
@@ -127,54 +127,6 @@ class SideGroup(LoopGroup):
         return moved
 
 
-class Job:
-    """A call for a thread, and what came of it."""
-
-    __slots__ = ("arguments", "began", "call", "done", "error", "lane", "owner", "result", "time_hold", "worker")
-
-    def __init__(
-        self,
-        worker: RunningNode,
-        owner: Any,
-        call: Callable[..., Any],
-        arguments: tuple[Any, ...],
-        done: Callable[[Any, BaseException | None], None],
-    ) -> None:
-        self.worker = worker
-        self.owner = owner
-        self.call = call
-        self.arguments = arguments
-        self.done = done
-        self.began = 0.0  # where time is shared
-        self.time_hold: Any = None  # what keeps virtual time from passing until it is back
-        self.lane: Any = None  # the thread that does it
-        self.result: Any = None
-        self.error: BaseException | None = None
-
-    def begin(self, now: float) -> None:
-        """It is given to a thread, where the time that it takes is shared."""
-        self.began = now
-
-    def run(self) -> None:
-        """In the thread: make the call, and keep what comes of it."""
-        try:
-            self.result = self.call(*self.arguments)
-        except BaseException as error:
-            self.error = error
-
-    def keep_time(self, hold: Any) -> None:
-        """This keeps virtual time from passing until it is back; None: nothing does any more."""
-        self.time_hold = hold
-
-    def disown(self) -> None:
-        """Nobody wants to hear of it any more."""
-        self.owner = _nobody
-
-
-def _nobody(_job: Job) -> None:
-    """To whom a job comes back that was given up."""
-
-
 class ThreadGroup(Group):
     """Threads of its own. The loop decides what they do next; results and signals of each come back in order.
 
@@ -239,10 +191,8 @@ class ThreadGroup(Group):
     def submit(self, job: Job) -> None:
         """Give a thread a job; on the loop."""
         lane = self._idle.pop() if self._idle else self._new_lane()
-        job.lane = lane
+        job.begin(lane, 0.0 if self.charges is None else self.clock())
         self.running += 1
-        if self.charges is not None:
-            job.begin(self.clock())
         lane.jobs.put(job)
 
     def _new_lane(self) -> _Lane:

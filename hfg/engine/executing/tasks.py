@@ -16,7 +16,7 @@ from hfg.base.clock import current_clock, current_elapsed
 from hfg.base.logs import current_log
 from hfg.engine.executing.code import CodeRunner, run_as
 from hfg.engine.executing.eager_task import EagerTask
-from hfg.engine.model import Core, Doing, Task, Tasks
+from hfg.engine.model import Core, Doing, Task
 from hfg.engine.model.core import PENDING
 from hfg.engine.model.current import current_firing, current_task
 from hfg.engine.model.running_node import DISABLED, ENDED, TORN_DOWN, RunningNode
@@ -84,11 +84,8 @@ class TaskRunner:
         if worker.blocked & DISABLED and not worker.lifecycle.opening:
             coroutine.close()  # a firing of a node that was switched off meanwhile: what it does goes nowhere (F10)
             return
-        if worker.tasks is None:
-            worker.start_tasks(Tasks(worker))
-            self._core.rules.bind_ports(worker)  # what it sends is looked at from here on
         task = Task(worker, name, coroutine, doing)
-        worker.tasks.begin(task)
+        worker.need_tasks().begin(task)
         if doing is not None:
             doing.begin(task)
         self.under_way[task] = None
@@ -173,8 +170,7 @@ class TaskRunner:
             failure = do_activity.over(worker, task, result, error)
         if failure is not None:
             self._failed(task, failure)
-        tasks: Tasks = worker.tasks
-        tasks.over(task)
+        worker.need_tasks().over(task)
         if task.doing is not None:
             do_activity.go_on(worker)
 
@@ -184,8 +180,8 @@ class TaskRunner:
         what = task.what + (", after its end" if worker.blocked & ENDED else "")
         if self._core.over:
             self._problems.append(errors.as_node_error(worker, what, error))
-        elif task.cancelled and worker.tasks.ending and not worker.blocked & DISABLED:
-            worker.tasks.problems.append(errors.as_node_error(worker, what, error))
+        elif task.cancelled and worker.need_tasks().ending and not worker.blocked & DISABLED:
+            worker.need_tasks().problems.append(errors.as_node_error(worker, what, error))
         else:
             errors.fail_beside(worker, what, error)
 
@@ -213,6 +209,6 @@ def _not_again(worker: RunningNode) -> None:
         return
     firing = current_firing.get()
     if firing is not None and firing.worker is worker:
-        firing.attempts.has_triggered()
+        firing.attempts.mark_triggered()
     elif worker.attempts is not None:
-        worker.attempts.has_triggered()
+        worker.attempts.mark_triggered()

@@ -263,7 +263,7 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
 def _take_activity(worker: RunningNode, active: bool) -> None:
     """A6: what the call brings acts before it; nothing depends on the activity of such a node but itself."""
     if worker.active != active:
-        worker.take_activity(active)
+        worker.become(active)
         if worker.core.trace_changes is not None:
             tell_activity(worker, "token")
 

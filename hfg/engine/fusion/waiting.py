@@ -63,7 +63,7 @@ def waiting_step(worker: RunningNode) -> Step:
         worker.fire_plainly(held, stamp)
         if pipelined:
             release(pipelined)
-        eager_task = worker.execution.eager_task
+        eager_task: Any = worker.execution.eager_task
         if eager_task is not lent:
             lent, late = eager_task, code.late(worker, leave)
         core.running_node = worker

@@ -1,19 +1,20 @@
-"""What a run is made of: its nodes, subgraphs and ready queues, and the state they share.
+"""What a run consists of: its nodes, subgraphs and ready queues, and the state that they share.
 
-vertex    one node in the plan: its code and its edges      shape     what these say about each of its firings
-worker    one node while it runs                            core      one run, and what it needs of those above
-scopes    subgraphs, gates      groups    nodes that run one at a time      policies  who of them is next
-iteration   the border of a subgraph that iterates (G4)
-concurrent   firings of a node that are under way at once      tasks     what its code has started beside its firings
-current   whose code runs       sharing   who uses which values, in debug mode      invariants  what holds of all of it
+vertex       one node in the plan: its code and edges    node_state    what its firings and calls change
+running_node one node while it runs                      records       parts of its state
+concurrent   its firings that are in progress at once    tasks         what its code has started besides
+core         one run, and what it needs of higher layers groups        nodes that run one at a time
+policies     which of them is next                       scopes        subgraphs and gates
+iteration    the border of a subgraph that iterates      current       whose code runs
+sharing      who uses which values, in debug mode        invariants    what holds of all of it
 
-These refer to each other all over, and import each other one way only: what stands below the class of nodes is generic
-in it. The names below have it filled in; they are for everybody outside of this wing.
+These refer to each other in all directions, but imports go one way only: what is below the class of nodes is generic in
+it. The names here have it filled in, for all other packages.
 """
 
 from typing import TypeAlias
 
-from hfg.engine.model import concurrent, core, events, groups, iteration, scopes, tasks
+from hfg.engine.model import concurrent, core, events, groups, iteration, records, scopes, tasks
 from hfg.engine.model.running_node import RunningNode
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "Gate",
     "Group",
     "Iteration",
+    "Job",
     "RunningEvent",
     "RunningNode",
     "Runtime",
@@ -40,6 +42,7 @@ Gate: TypeAlias = scopes.Gate[RunningNode]
 Group: TypeAlias = groups.Group[RunningNode]
 Runtime: TypeAlias = core.Runtime[RunningNode]
 Iteration: TypeAlias = iteration.Iteration[RunningNode]
+Job: TypeAlias = records.Job[RunningNode]
 RunningEvent: TypeAlias = events.RunningEvent[RunningNode]
 Scope: TypeAlias = scopes.Scope[RunningNode]
 Task: TypeAlias = tasks.Task[RunningNode]

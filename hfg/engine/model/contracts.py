@@ -1,32 +1,55 @@
-"""What the model asks of a node below the class of nodes, which is `worker.RunningNode`; and what a timer is.
+"""What the model requires of a node below the class of nodes, `running_node.RunningNode`; and of timers and tasks.
 
-A run is a web: a node knows its group, its subgraphs and the run, and each of these knows its nodes. Imports go one way
-all the same, since what stands below the class of nodes is generic in it: `NodeT`. `hfg.engine.model` gives the names
-with it filled in.
+A node refers to its group, its subgraphs and the run, and each of these refers to its nodes. Imports still go one way,
+because everything below the class of nodes is generic in it: `NodeT`. `hfg.engine.model` has the names with it filled
+in.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from typing import Any, Protocol, TypeVar
 
-from hfg.engine.model.ending import Ending
-
-__all__ = ["Node", "NodeT", "Timer"]
+__all__ = ["EagerTask", "NodeT", "Timer"]
 
 
 class Timer(Protocol):
     """A call that has not happened yet."""
 
     def cancel(self) -> None:
-        """Forget it."""
+        """Do not make the call."""
 
     def recount(self, counts: bool) -> None:
-        """Whether it could start something, so that quiet waits for it."""
+        """Set whether it could start something, so that quiet waits for it."""
+
+
+class EagerTask(Protocol):
+    """What runs coroutines of a node; see `executing.eager_task`."""
+
+    task: Any
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a coroutine is in progress."""
+
+    def enter(self, call: Callable[..., object], *arguments: object) -> None:
+        """Call something in the context of the coroutines."""
+
+    def start(self, coroutine: Coroutine[Any, Any, Any], done: Callable[[Any, BaseException | None], None]) -> object:
+        """Run the first step of a coroutine."""
+
+    def is_current(self) -> bool:
+        """Return whether the caller is code that it runs."""
+
+    def cancel(self) -> None:
+        """Cancel the coroutine in progress."""
+
+    def drop(self) -> None:
+        """Run the coroutine no further."""
 
 
 class _Counts(Protocol):
-    """What of the run is counted by what a node has under way."""
+    """What the run counts of the work that a node has in progress."""
 
     tasks: int
     waiting_room: int
@@ -41,17 +64,16 @@ class _Counts(Protocol):
 
 
 class _Watched(Protocol):
-    def tell_watchers(self) -> None: ...
+    def notify_watchers(self) -> None: ...
 
 
-class Node(Protocol):
-    """What firings, tasks, subgraphs, gates and borders ask of a node."""
+class _Node(Protocol):
+    """What firings, tasks, subgraphs, gates and borders require of a node; `RunningNode` describes it."""
 
     path: str
     type: Any
     options: Any
     active: bool
-    ending: Ending | None
     in_edges: tuple[Any, ...]
     slot_edges: tuple[Any, ...]
     out_edges: tuple[tuple[Any, ...], ...]
@@ -60,27 +82,23 @@ class Node(Protocol):
     gates: list[Any]
 
     @property
-    def core(self) -> _Counts:
-        """The run."""
-
-    def lie_in(self, around: tuple[Any, ...]) -> None:
-        """These subgraphs are around it, outermost first."""
+    def core(self) -> _Counts: ...
 
     @property
-    def be_gated(self) -> Callable[[Any], None]:
-        """It works only while the state of this gate is active."""
+    def room(self) -> _Watched: ...
 
     @property
-    def lie_within(self) -> Callable[[Any], None]:
-        """G4: the innermost subgraph around it that iterates is this one's."""
-
-    def moves_by_itself(self) -> bool:
-        """Whether something of it is under way or will be, without anybody else."""
+    def be_gated(self) -> Callable[[Any], None]: ...
 
     @property
-    def room(self) -> _Watched:
-        """F8: who waits until code of it is over."""
+    def be_within(self) -> Callable[[Any], None]: ...
+
+    def enclose(self, around: tuple[Any, ...]) -> None: ...
+
+    def brings_activity(self) -> bool: ...
+
+    def moves_by_itself(self) -> bool: ...
 
 
-NodeT = TypeVar("NodeT", bound=Node)
-"""The class of nodes, to what stands below it."""
+NodeT = TypeVar("NodeT", bound=_Node)
+"""The class of nodes, for everything below it."""

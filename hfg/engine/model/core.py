@@ -179,9 +179,13 @@ class Code(Protocol[NodeT]):
         """Run a hook of activity beside whatever the worker is doing."""
 
     def drive(
-        self, worker: NodeT, coroutine: Coroutine[Any, Any, object], done: Callable[[Any, BaseException | None], None]
+        self,
+        worker: NodeT,
+        coroutine: Coroutine[Any, Any, object],
+        done: Callable[[Any, BaseException | None], None],
+        firing: ConcurrentFiring[NodeT] | None = None,
     ) -> None:
-        """Take a coroutine of the worker's code to its end."""
+        """Run a coroutine of the node's code, or of one of its firings (F14), to its end."""
 
     def late(
         self, worker: NodeT, done: Callable[[Any, BaseException | None], None]
@@ -197,19 +201,8 @@ class Code(Protocol[NodeT]):
     ) -> None:
         """Run the code of one of several firings of a node (F14); `done` follows, at once or later on the loop."""
 
-    def drive_concurrent(
-        self,
-        firing: ConcurrentFiring[NodeT],
-        coroutine: Coroutine[Any, Any, Any],
-        done: Callable[[Any, BaseException | None], None],
-    ) -> None:
-        """Take a coroutine of the firing's code to its end."""
-
-    def interrupt_concurrent(self, firing: ConcurrentFiring[NodeT]) -> None:
-        """Cancel or abandon the code of the firing (X2)."""
-
-    def interrupt(self, worker: NodeT) -> None:
-        """Cancel or abandon the code of the worker that is under way (X2)."""
+    def interrupt(self, worker: NodeT, *, firing: ConcurrentFiring[NodeT] | None = None) -> None:
+        """Cancel or abandon code of the node that is in progress, or that of one of its firings (X2, F14)."""
 
     async def trigger_wait(
         self, event: RunningEvent[NodeT], value: object, activity: int | None, stamp: float | None
@@ -404,8 +397,8 @@ class Core(Generic[NodeT]):
         """It is over, or given up."""
         self.in_flight -= 1
 
-    def number_workers(self) -> int:
-        """Give a number that no worker of this run has yet."""
+    def number_node(self) -> int:
+        """Return a number that no node of this run has yet."""
         return next(self._numbers)
 
     def after(self, delay_s: float, callback: Callable[[], None]) -> Timer:

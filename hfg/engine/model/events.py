@@ -1,8 +1,9 @@
-"""The events of running nodes that somebody asks for. Stands on the ports."""
+"""The events of running nodes that have an edge or a subscriber."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, Generic
 
 from hfg.engine.model.contracts import NodeT
@@ -13,31 +14,29 @@ __all__ = ["RunningEvent", "slots_first"]
 
 
 def slots_first(edge: Edge) -> tuple[bool, float]:
-    """The order in which the signals of an event leave (F9)."""
+    """Return the sort key by which the signals of an event leave (F9)."""
     return (edge.target_kind == "input", edge.index)
 
 
+@dataclass(slots=True, eq=False)
 class RunningEvent(Generic[NodeT]):
-    """An event of a running node and the edges it feeds, slots first (F9)."""
+    """An event of a running node and the edges that it feeds, slots first (F9)."""
 
-    __slots__ = ("edges", "name", "pipelines", "port", "tap", "worker")
-
-    def __init__(self, worker: NodeT, name: str, port: EventPort[Any] | None) -> None:
-        self.worker = worker
-        self.name = name
-        self.port: Any = port
-        self.edges: tuple[Any, ...] = ()
-        self.tap: tuple[Any, ...] | None = None  # who looks at its signals; () if at one of its edges only
+    worker: NodeT
+    name: str
+    port: Any  # an EventPort, or None: triggers it, and has its subscribers
+    edges: tuple[Any, ...] = ()
+    tap: tuple[Any, ...] | None = None  # who observes its signals; () if they observe only one of its edges
 
     @property
     def label(self) -> str:
-        """Its path, as traces name it."""
+        """Its path, as in traces."""
         return f"{self.worker.path}.{self.name}" if self.worker.path else self.name
 
     def bind(self, port: EventPort[Any]) -> None:
-        """By this port it is triggered, and heard."""
+        """Use this port from now on."""
         self.port = port
 
     def feed(self, edges: Iterator[Any] | tuple[Any, ...]) -> None:
-        """It feeds these edges from now on."""
+        """Feed these edges from now on."""
         self.edges = tuple(sorted(edges, key=slots_first))

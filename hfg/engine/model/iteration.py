@@ -1,75 +1,52 @@
-"""A subgraph that iterates over collections (rule G4): what its border knows of the firing under way.
+"""The border of a subgraph that iterates over collections (rule G4), and the firing that it has in progress.
 
-The nodes inside are workers of the same run as all others. What is special is the border alone: it lets the next
-element in when nothing inside moves any more by itself, and keeps what comes out. Plain state, decided over by
-`rules.iterating`. Stands on nothing.
+The nodes inside are nodes of the same run as all others. Only the border is special: it lets the next element in when
+nothing inside moves any more, and collects the results. `rules.iterating` decides when.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Generic
 
-from hfg.engine.model.contracts import Node, NodeT
+from hfg.engine.model.contracts import NodeT
 
 __all__ = ["Iteration", "amid_element"]
 
 
+@dataclass(slots=True, eq=False)
 class Iteration(Generic[NodeT]):
-    """The border of one subgraph that iterates.
+    """The border of one subgraph that iterates."""
 
-    Attributes:
-      worker: the subgraph, which outside is one node that fires.
-      members: those directly inside, the readers too; what iterates among them stands for its own inside.
-      feeds: by which elements go in, one for each input with an edge inside.
-      readers: by which results come out, one for each output with an edge inside.
-      count: how many elements the firing under way has; None while there is none.
-      position: how many of them have been let in.
-    """
-
-    __slots__ = (
-        "_columns",
-        "_moving",
-        "_repeated",
-        "_results",
-        "_timers",
-        "count",
-        "feeds",
-        "members",
-        "position",
-        "readers",
-        "worker",
-    )
-
-    def __init__(self, worker: NodeT) -> None:
-        self.worker = worker
-        self.members: list[NodeT] = []
-        self.feeds: list[NodeT] = []
-        self.readers: list[NodeT] = []
-        self.count: int | None = None
-        self.position = 0
-        self._columns: dict[str, list[Any]] = {}
-        self._repeated: dict[str, Any] = {}
-        self._results: dict[str, list[Any]] = {}
-        self._moving = 0  # who was found moving last
-        self._timers = 0  # of operators inside
+    worker: NodeT  # the subgraph, which is one node for those outside
+    members: list[NodeT] = field(default_factory=list)  # directly inside; an iterating one represents its own inside
+    feeds: list[NodeT] = field(default_factory=list)  # elements go in here: one for each input with an edge inside
+    readers: list[NodeT] = field(default_factory=list)  # results come out here: one for each such output
+    count: int | None = None  # elements of the firing in progress; None: there is none
+    position: int = 0  # how many of them have been let in
+    _columns: dict[str, list[Any]] = field(default_factory=dict)
+    _repeated: Mapping[str, Any] = field(default_factory=dict)
+    _results: dict[str, list[Any]] = field(default_factory=dict)
+    _moving: int = 0  # the member that was last found moving
+    _timers: int = 0  # of operators inside
 
     # --- who is inside ---
 
     def join(self, worker: NodeT) -> None:
-        """Somebody is inside from now on."""
-        worker.lie_within(self)
+        """Add a member."""
+        worker.be_within(self)
         self.members.append(worker)
 
     def leave(self, worker: NodeT) -> None:
-        """Somebody is not any more."""
+        """Remove a member."""
         self.members.remove(worker)
 
     def is_moving(self) -> bool:
-        """Whether something inside happens now or will by itself, so that it is not quiet there.
+        """Return whether something inside happens now or will happen by itself, so that it is not quiet there.
 
-        Asked after every step inside, so who was found moving last is looked at first, and then those behind it: in
-        most graphs the next to move is the next in order of adding.
+        This is asked after every step inside. So the member that was last found moving comes first, and then those
+        after it: in most graphs the next to move is the next in the order of adding.
         """
         if self._timers:
             return True
@@ -85,26 +62,22 @@ class Iteration(Generic[NodeT]):
             at += 1
         return False
 
-    def set_timer(self) -> None:
-        """An operator on an edge inside waits for its time."""
-        self._timers += 1
+    def count_timer(self, change: int) -> None:
+        """One more operator on an edge inside waits for its time (1), or one fewer (-1)."""
+        self._timers += change
 
-    def timer_over(self) -> None:
-        """It does not any more."""
-        self._timers -= 1
-
-    # --- the firing under way ---
+    # --- the firing in progress ---
 
     @property
     def is_under_way(self) -> bool:
-        """Whether the subgraph is amid a firing."""
+        """Whether the subgraph has a firing in progress."""
         return self.count is not None
 
     def begin(self, arguments: Mapping[str, Any], over: Collection[str]) -> None:
-        """A firing begins, with these values.
+        """Start a firing.
 
         Args:
-          arguments: by input.
+          arguments: values by input.
           over: the inputs whose elements go in one by one; the others repeat.
 
         Raises:
@@ -116,38 +89,38 @@ class Iteration(Generic[NodeT]):
             shown = ", ".join(f'"{name}" has {length}' for name, length in lengths.items())
             raise ValueError(f"it iterates over inputs of unequal length: {shown} elements")
         self._columns = columns
-        self._repeated = {name: value for name, value in arguments.items() if name not in columns}
+        self._repeated = arguments
         self._results = {name: [] for name in self.worker.type.outputs}
         self.position = 0
         self.count = next(iter(lengths.values()), 0)
 
     def next_element(self) -> bool:
-        """Whether there is one more, which `value` gives from now on."""
+        """Continue with the next element, if there is one. Return whether there is."""
         if self.position == self.count:
             return False
         self.position += 1
         return True
 
     def value(self, name: str) -> object:
-        """What an input is of the present element."""
+        """Return the current element of an input, or the value that it repeats."""
         column = self._columns.get(name)
         return self._repeated[name] if column is None else column[self.position - 1]
 
     def keep(self, name: str, value: object) -> None:
-        """Something has come out; what comes between two firings is nobody's result."""
+        """Collect a result; a value that comes out between two firings belongs to none and is dropped."""
         if self.is_under_way:
             self._results[name].append(value)
 
     def end(self) -> dict[str, list[Any]]:
-        """The firing is over: gives what came out, by output."""
+        """End the firing. Return the results by output."""
         results = self._results
         self.count = None
         self._columns, self._repeated, self._results = {}, {}, {}
         return results
 
 
-def amid_element(worker: Node) -> str:
-    """Say which element a node inside of what iterates works on, as the end of a phrase; nothing for others."""
+def amid_element(worker: NodeT) -> str:
+    """Return which element a node inside of a subgraph that iterates works on, as the end of a phrase; "" elsewhere."""
     said = ""
     around = worker.within
     while around is not None:

@@ -1,98 +1,76 @@
 """Subgraphs at run time (rule G2) and gates (rule A11): what depends on the activity of something else.
 
-A scope is a dissolved subgraph that somebody watches: it has an automatic event with an edge, `active_for_s`, or
-gates a node. Its activity is derived, never stored by a token. Stands on nothing.
+A scope is a dissolved subgraph. Its activity is derived from its inside, and only if something depends on it: an
+automatic event with an edge, `active_for_s`, or a gate.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from typing import Any, Generic
 
-from hfg.engine.model.contracts import Node, NodeT
+from hfg.engine.model.contracts import NodeT
 
 __all__ = ["Gate", "Scope"]
 
 
+@dataclass(slots=True, eq=False)
 class Scope(Generic[NodeT]):
-    """A subgraph whose activity matters.
+    """A subgraph in a run."""
 
-    Attributes:
-      worker: its automatic ports live on a worker of their own, which never fires.
-      members: the running nodes inside, nested ones too.
-      children: the scopes directly inside.
-      inner_edges: the edges with both ends inside.
-      active: A(subgraph) as last derived.
-      told: A(subgraph) as its events have told it last.
-    """
+    index: float  # its place in the order of all
+    path: str
+    parent: Scope[NodeT] | None
+    enabled: bool = True
+    members: list[NodeT] = field(default_factory=list)  # the running nodes inside, including nested ones
+    children: list[Scope[NodeT]] = field(default_factory=list)  # the scopes directly inside
+    inner_edges: list[Any] = field(default_factory=list)  # those with both ends inside
+    worker: NodeT | None = None  # has its automatic ports, and never fires
+    active: bool = False  # A(subgraph) as last derived
+    told: bool = False  # A(subgraph) as its events have last reported it
+    watched: bool = False  # something depends on its activity
+    gates: list[Gate[NodeT]] = field(default_factory=list)  # those that depend on it
 
-    __slots__ = (
-        "active",
-        "children",
-        "enabled",
-        "gates",
-        "index",
-        "inner_edges",
-        "members",
-        "parent",
-        "path",
-        "told",
-        "watched",
-        "worker",
-    )
+    def __post_init__(self) -> None:
+        if self.parent is not None:
+            self.parent.children.append(self)
 
-    def __init__(self, index: float, path: str, parent: Scope[NodeT] | None, *, enabled: bool = True) -> None:
-        self.index = index
-        self.path = path
-        self.parent = parent
-        self.members: list[NodeT] = []
-        self.children: list[Scope[NodeT]] = []
-        if parent is not None:
-            parent.children.append(self)
-        self.inner_edges: list[Any] = []
-        self.worker: NodeT | None = None
-        self.active = False
-        self.told = False
-        self.enabled = enabled
-        self.watched = False
-        self.gates: list[Gate[NodeT]] = []
-
-    def be_told_by(self, worker: NodeT) -> None:
-        """Its automatic ports live there."""
+    def owned_by(self, worker: NodeT) -> None:
+        """This running node has its automatic ports."""
         self.worker = worker
 
     def take_in(self, members: Iterable[NodeT]) -> None:
-        """These running nodes are inside, and know it."""
+        """Enclose these running nodes."""
         self.members = list(members)
         for member in self.members:
-            member.lie_in((*member.around, self))
+            member.enclose((*member.around, self))
 
     def move(self, path: str, parent: Scope[NodeT] | None) -> None:
-        """It is called otherwise, and lies elsewhere, as the last one inside of that."""
+        """Give it another path and place it last in another subgraph."""
         self.path = path
         self.parent = parent
         if parent is not None:
             parent.children.append(self)
 
     def rename(self, path: str) -> None:
-        """It is called otherwise from now on."""
+        """Give it another path."""
         self.path = path
 
     def renumber(self, index: float) -> None:
-        """It comes here in the order of all."""
+        """Give it another place in the order of all."""
         self.index = index
 
     def forget_gates(self) -> None:
-        """No gate looks at its activity."""
+        """No gate depends on its activity."""
         self.gates = []
 
     def and_around(self) -> tuple[Scope[NodeT], ...]:
-        """Give it and those around it, outermost first."""
+        """Return it and those around it, outermost first."""
         return (*(self.parent.and_around() if self.parent is not None else ()), self)
 
     def inside(self) -> list[NodeT]:
-        """Give the workers of all nodes and subgraphs inside."""
-        assert self.worker is not None
+        """Return the running nodes of all nodes and subgraphs inside."""
         found = list(self.members)
         waiting = list(reversed(self.children))
         while waiting:
@@ -103,58 +81,44 @@ class Scope(Generic[NodeT]):
         return found
 
     def find_inner_edges(self) -> None:
-        """Note the edges with both ends inside; left until somebody asks, since most subgraphs are just boxes."""
-        assert self.worker is not None
+        """Find the edges with both ends inside. Not done before it is watched: most subgraphs are just boxes."""
         inside = set(self.inside())
         self.inner_edges = [
             edge for worker in inside for edge in (*worker.in_edges, *worker.slot_edges) if edge.source in inside
         ]
 
     def look(self) -> bool:
-        """Derive its activity anew; whether it has changed."""
+        """Derive its activity again. Return whether it has changed."""
         before, self.active = self.active, self.derive()
         return self.active != before
 
     def tell(self) -> bool:
-        """Its events tell its activity now; gives it back."""
+        """Return its activity, which its events report now."""
         self.told = self.active
         return self.active
 
     def watch(self) -> None:
-        """Somebody cares about its activity: it is derived from now on."""
+        """Derive its activity from now on."""
         self.watched = True
         self.find_inner_edges()
         self.active = self.told = self.derive()
 
     def derive(self) -> bool:
-        """Whether an inner node is active, or a token with +1 lies untaken inside or was drained and has yet to act.
-
-        (G2, F12).
-        """
-        return any(worker.active or _will_be(worker) for worker in self.members) or any(
+        """Return whether an inner node is active, or a +1 is untaken inside or was drained and has yet to act (G2)."""
+        return any(worker.active or worker.brings_activity() for worker in self.members) or any(
             token.activity > 0 for edge in self.inner_edges for token in edge.contents()
         )
 
 
-def _will_be(worker: Node) -> bool:
-    return worker.ending is not None and worker.ending.brings_activity
-
-
+@dataclass(slots=True, eq=False)
 class Gate(Generic[NodeT]):
-    """Work coupled to the activity of a state node or subgraph (A11).
+    """Work coupled to the activity of a state node or subgraph (A11)."""
 
-    Attributes:
-      state: who must be active.
-      idle_rate_hz: how many firings a second run while it is not; None suspends.
-      workers: the gated running nodes.
-    """
+    state: NodeT | Scope[NodeT]  # must be active
+    idle_rate_hz: float | None  # how many firings per second run while it is not; None suspends
+    workers: list[NodeT]  # the gated ones
 
-    __slots__ = ("idle_rate_hz", "state", "workers")
-
-    def __init__(self, state: NodeT | Scope[NodeT], idle_rate_hz: float | None, workers: Iterable[NodeT]) -> None:
-        self.state = state
-        self.idle_rate_hz = idle_rate_hz
-        self.workers = list(workers)
+    def __post_init__(self) -> None:
         for worker in self.workers:
             worker.be_gated(self)
-        state.gates.append(self)
+        self.state.gates.append(self)

@@ -1,79 +1,59 @@
-"""Tasks that the code of one node has started by `start_soon` (rules X1, X3, R5): what the rules know of them.
+"""Tasks that the code of one node has started by `start_soon` (rules X1, X3, R5).
 
-They are beside the node's firings: none waits for them, but quiet and the node's teardown do. Plain state; what makes
-them go on is `executing.tasks`, and both exist only where somebody has started one.
+They run alongside the node's firings, which do not wait for them; quiet and the node's teardown do. `executing.tasks`
+runs them. A node has these records only if it has started a task.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
+from dataclasses import dataclass, field
 from typing import Any, Generic
 
-from hfg.engine.model.contracts import NodeT
+from hfg.engine.model.contracts import EagerTask, NodeT
 from hfg.errors import NodeError
 
 __all__ = ["Doing", "Task", "Tasks"]
 
 
+@dataclass(slots=True, eq=False)
 class Task(Generic[NodeT]):
-    """One of them.
+    """One task."""
 
-    Attributes:
-      worker: whose code has started it.
-      name: of its coroutine function.
-      coroutine: what it runs.
-      eager_task: what carries it once it has begun.
-      cancelled: its node is torn down or switched off, the run is over, or a do-activity is to end with A(v).
-      doing: of a do-activity.
-    """
-
-    __slots__ = ("cancelled", "coroutine", "doing", "eager_task", "name", "worker")
-
-    def __init__(
-        self, worker: NodeT, name: str, coroutine: Coroutine[Any, Any, Any], doing: Doing[NodeT] | None = None
-    ) -> None:
-        self.worker = worker
-        self.doing = doing
-        self.name = name
-        self.coroutine = coroutine
-        self.eager_task: Any = None
-        self.cancelled = False
+    worker: NodeT  # whose code has started it
+    name: str  # of its coroutine function
+    coroutine: Coroutine[Any, Any, Any]
+    doing: Doing[NodeT] | None = None  # of a do-activity
+    eager_task: EagerTask | None = None  # runs it once it has started
+    cancelled: bool = False  # by a teardown, by disabling, by the end of the run, or a do-activity by that of A(v)
 
     @property
     def what(self) -> str:
-        """What it is called where it fails."""
+        """Its name in error messages."""
         return f'task "{self.name}"' if self.doing is None else "do()"
 
-    def run_in(self, eager_task: object) -> None:
-        """It begins."""
+    def run_in(self, eager_task: EagerTask) -> None:
+        """It starts."""
         self.eager_task = eager_task
 
     def is_current(self) -> bool:
-        """Whether the code that asks is its own, and not that of something which it has started by itself."""
+        """Return whether the caller is its own code, and not that of a task which it has started itself."""
         return self.eager_task is not None and self.eager_task.is_current()
 
     def cancel(self) -> None:
-        """Let it end: at what it waits for, or before it has begun."""
+        """Cancel it where it waits, or before it starts."""
         self.cancelled = True
         if self.eager_task is not None:
             self.eager_task.cancel()
 
 
+@dataclass(slots=True, eq=False)
 class Doing(Generic[NodeT]):
-    """The do-activity of one node (A15): never two at once.
+    """The do-activity of one node (A15): at most one at a time."""
 
-    Attributes:
-      task: the one under way, which may be about to end.
-      due: it is to begin: A(v) has become 1, or the node was set up anew while A(v) is 1.
-      entering: how many `on_activated` hooks it has to wait for.
-    """
-
-    __slots__ = ("due", "entering", "task")
-
-    def __init__(self) -> None:
-        self.task: Task[NodeT] | None = None
-        self.due = False
-        self.entering = 0
+    task: Task[NodeT] | None = None  # the one in progress, which may be about to end
+    due: bool = False  # it should start: A(v) has become 1, or the node was set up again while A(v) is 1
+    entering: int = 0  # `on_activated` hooks that it has to wait for
 
     def enter(self) -> None:
         """A(v) has become 1; `on_activated` comes first."""
@@ -81,7 +61,7 @@ class Doing(Generic[NodeT]):
         self.entering += 1
 
     def entered(self) -> None:
-        """One `on_activated` is over."""
+        """One `on_activated` has ended."""
         self.entering -= 1
 
     def leave(self) -> None:
@@ -91,15 +71,16 @@ class Doing(Generic[NodeT]):
             self.task.cancel()
 
     def be_due(self, due: bool) -> None:
-        """The node has been set up; whether it is active."""
+        """The node has been set up; `due`: it is active."""
         self.due = due
 
+    @property
     def may_begin(self) -> bool:
-        """Whether it is to begin, as far as it knows itself."""
+        """Whether it should start now, as far as it knows itself."""
         return self.due and not self.entering and self.task is None
 
     def begin(self, task: Task[NodeT]) -> None:
-        """It has begun."""
+        """It has started."""
         self.due = False
         self.task = task
 
@@ -108,78 +89,70 @@ class Doing(Generic[NodeT]):
         self.task = None
 
 
+@dataclass(slots=True, eq=False)
 class Tasks(Generic[NodeT]):
-    """Those of one node that are under way.
+    """The tasks of one node that are in progress."""
 
-    Attributes:
-      waiting_room: how many wait until a queue has room (F8).
-      problems: what those failed with that were cancelled, for whoever ends them.
-      doing: the do-activity of the node, which most types do not have.
-    """
-
-    __slots__ = ("_on_rest", "_under_way", "_worker", "doing", "problems", "waiting_room")
-
-    def __init__(self, worker: NodeT) -> None:
-        self._worker = worker
-        self._under_way: dict[Task[NodeT], None] = {}
-        self._on_rest: list[Callable[[], None]] = []
-        self.waiting_room = 0
-        self.problems: list[NodeError] = []
-        self.doing: Doing[NodeT] = Doing()
+    _worker: NodeT
+    doing: Doing[NodeT] = field(default_factory=Doing)  # most node types have no do-activity
+    waiting_room: int = 0  # how many wait until a queue has room (F8)
+    problems: list[NodeError] = field(default_factory=list)  # failures of cancelled ones, for whoever ends them
+    _in_progress: dict[Task[NodeT], None] = field(default_factory=dict)
+    _on_rest: list[Callable[[], None]] = field(default_factory=list)
 
     def __len__(self) -> int:
-        return len(self._under_way)
+        return len(self._in_progress)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What they are called, in the order in which they began."""
-        return tuple(task.name for task in self._under_way)
+        """Their names, in the order in which they started."""
+        return tuple(task.name for task in self._in_progress)
 
     @property
     def move(self) -> bool:
-        """Whether one of them does not only wait for room."""
-        return len(self._under_way) > self.waiting_room
+        """Whether one of them does more than wait for room."""
+        return len(self._in_progress) > self.waiting_room
 
     @property
     def ending(self) -> bool:
-        """Whether somebody waits until all of them have ended."""
+        """Whether something waits until all of them have ended."""
         return bool(self._on_rest)
 
     def begin(self, task: Task[NodeT]) -> None:
-        """One more."""
-        self._under_way[task] = None
+        """Add one."""
+        self._in_progress[task] = None
         self._worker.core.tasks += 1
 
     def over(self, task: Task[NodeT]) -> None:
-        """One less; behind the last one those have their turn who wait for that."""
-        del self._under_way[task]
+        """One has ended. After the last one, call back whoever waits for that."""
+        del self._in_progress[task]
         self._worker.core.tasks -= 1
-        if not self._under_way:
+        if not self._in_progress:
             waiting, self._on_rest = self._on_rest, []
             for callback in waiting:
                 callback()
 
     def wait_for_room(self, how_many: int) -> None:
-        """F8: so many more of them await `trigger_wait`."""
+        """Change how many of them await `trigger_wait` (F8)."""
         self.waiting_room += how_many
         self._worker.core.waiting_room += how_many
         self._worker.core.suspects[self._worker] = None
 
     def cancel(self) -> None:
-        """Let all of them end; what is about to has been told once, and may take its time."""
-        for task in list(self._under_way):
+        """Cancel all of them, each once; one that is ending already may take its time."""
+        for task in list(self._in_progress):
             if not task.cancelled:
                 task.cancel()
 
     def end(self, then: Callable[[], None]) -> bool:
-        """Let all of them end; whether there are any, which `then` follows."""
-        if not self._under_way:
+        """Cancel all of them. Return whether there are any; `then` follows after the last one."""
+        if not self._in_progress:
             return False
         self._on_rest.append(then)
         self.cancel()
         return True
 
     def take_problem(self) -> NodeError | None:
-        """What the first of them failed with that failed as it was cancelled."""
+        """Return the first failure of a cancelled task."""
         problems, self.problems = self.problems, []
         return problems[0] if problems else None

@@ -216,7 +216,7 @@ def node_report(worker: RunningNode) -> NodeReport:
         failed=counts.failed,
         retries=counts.retries,
         restarts=counts.restarts,
-        most_under_way=worker.most_under_way(),
+        most_under_way=min(1, counts.firings) if worker.concurrent is None else worker.concurrent.most,
         active=worker.active,
         ended=bool(worker.blocked & ENDED),
     )

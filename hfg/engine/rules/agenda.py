@@ -6,7 +6,7 @@ Plain functions over the run's state; they queue workers and never run a node's 
 from __future__ import annotations
 
 from hfg.engine.model import Core
-from hfg.engine.model.rate import SAME_MOMENT_S
+from hfg.engine.model.records import SAME_MOMENT_S
 from hfg.engine.model.running_node import DISABLED, FULL, NO_CALLS, UNREADY, RunningNode
 from hfg.ports.edges import Edge, EventEdge
 

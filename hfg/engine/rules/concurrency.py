@@ -54,7 +54,7 @@ def begin(
     assert stamp is not None
     if kind == "end":  # behind all that are under way (F14)
         drop_taken(worker, edges, tokens)
-        concurrent.end(worker.counts.firings, stamp)
+        concurrent.end(ConcurrentFiring(worker, worker.counts.firings, stamp))
         worker.limit_concurrency()
     else:
         firing = ConcurrentFiring(worker, worker.counts.firings, stamp)
@@ -66,7 +66,7 @@ def begin(
             _failed(firing, refused)
         elif kind == "silent":
             worker.counts.add_silent()
-            firing.be_over("silent")
+            firing.complete("silent")
             concurrent.over(firing)
         else:
             _begin_process(firing, edges, tokens)
@@ -87,11 +87,11 @@ def _note_process(worker: RunningNode) -> None:
 def _begin_process(firing: ConcurrentFiring, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
     """F4(3): the function is run."""
     worker = firing.worker
-    if len(worker.out_names) > len(worker.type.outputs):
-        firing.parameters = dict(worker.node._parameters)
-    if worker.shape.remembers:
-        firing.remember(firings.values_of(edges, tokens))
-    firing.attempts.begin(tuple(firings.arguments_of(worker, edges, tokens)))
+    firing.begin(
+        tuple(firings.arguments_of(worker, edges, tokens)),
+        parameters=dict(worker.node._parameters) if len(worker.out_names) > len(worker.type.outputs) else None,
+        taken=firings.values_of(edges, tokens) if worker.shape.remembers else None,
+    )
     _attempt(firing)
 
 
@@ -109,9 +109,9 @@ def _when_done(firing: ConcurrentFiring) -> Callable[[Any, BaseException | None]
         if firing.ticket != ticket:
             return  # X2: it came too late, the attempt was given up
         if type(result) is CoroutineType and not firing.worker.group.threaded:
-            firing.worker.core.code.drive_concurrent(firing, result, done)
+            firing.worker.core.code.drive(firing.worker, result, done, firing)
             return
-        firing.in_time()
+        firing.end_attempt()
         if error is None:
             _complete(firing, result)
         elif ends_itself(firing.worker, error):
@@ -132,7 +132,7 @@ def _complete(firing: ConcurrentFiring, result: Any) -> None:
     except Exception as error:
         _failed(firing, error)
         return
-    firing.be_over("done", written)
+    firing.complete("done", written)
     _over(firing)
 
 
@@ -140,9 +140,9 @@ def _found_end(firing: ConcurrentFiring) -> None:
     """F2: the node has ended, behind those of its firings that are under way; what this one wrote leaves then (F4)."""
     worker = firing.worker
     concurrent = _flights(worker)
-    concurrent.forget(firing)
+    concurrent.leave(firing)
     if concurrent.ending is None:
-        concurrent.end(firing.number, firing.stamp, firing.take_written())
+        concurrent.end(ConcurrentFiring(worker, firing.number, firing.stamp, firing.take_written()))
     else:  # it has found that twice
         worker.counts.add_end_firing()
         _tell_end(firing, "ended")
@@ -169,7 +169,7 @@ def _failed(firing: ConcurrentFiring, error: BaseException) -> None:
     policy = errors.judge(worker, problem)
     if policy == "stop":
         return
-    firing.fail(problem, errors.outcome_of(problem), answers=policy != "disable")
+    firing.complete(errors.outcome_of(problem), failure=problem, answers=policy != "disable")
     restarts = errors.begin_over(worker, policy)
     _flights(worker).over(firing)
     if not firing.answers:
@@ -182,8 +182,8 @@ def _failed(firing: ConcurrentFiring, error: BaseException) -> None:
 def time_out(firing: ConcurrentFiring) -> None:
     """X2: the attempt has taken longer than `max_duration_s`: it is given up, its late result ignored."""
     worker = firing.worker
-    firing.in_time()
-    worker.core.code.interrupt_concurrent(firing)
+    firing.end_attempt()
+    worker.core.code.interrupt(worker, firing=firing)
     words = f"it took longer than max_duration_s = {worker.options.max_duration_s:g} s and was given up"
     _failed(firing, FiringTimeout(worker.path, f"firing {firing.number}", words))
 
@@ -257,7 +257,7 @@ def _leave(firing: ConcurrentFiring) -> None:
     elif firing.outcome in ("done", "ended"):
         _announce(firing, written)
     _tell_end(firing, firing.outcome)
-    if firing.number != _flights(worker).end_number:
+    if firing is not _flights(worker).last:
         return
     assert worker.ending is not None
     if worker.ending.is_dead_source:
@@ -298,8 +298,7 @@ def _end(worker: RunningNode) -> None:
     concurrent, core = _flights(worker), worker.core
     if concurrent:
         return
-    firing = ConcurrentFiring(worker, concurrent.end_number, concurrent.take_ending())
-    firing.be_given(concurrent.end_written)
+    firing = concurrent.take_ending()
     worker.counts.add_end_firing()
     worker.end()
     drain_left(worker.in_edges)
@@ -323,10 +322,9 @@ def _ended(firing: ConcurrentFiring, result: Any, error: BaseException | None) -
         errors.fail(worker, "end()", error, answer=False)
     if written is not None and not any(entry is not None for entry in written):
         written = None
-    firing.be_over("ended" if error is None else "failed", written)
+    firing.complete("ended" if error is None else "failed", written, answers=written is not None)
     concurrent.over(firing)
     if written is None:
-        firing.say_nothing()
         _leave(firing)
     _rest(worker)
 
@@ -382,11 +380,11 @@ def triggering(worker: RunningNode, emit: Emit) -> Emit:
     def noted(value: Any, activity: int | None, stamp: float | None) -> Any:
         firing = current_firing.get()
         if firing is not None and firing.worker is worker:
-            firing.attempts.has_triggered()
+            firing.attempts.mark_triggered()
             if stamp is None and type(value) is not Token and not firing.outcome:
                 stamp = firing.stamp
         elif worker.attempts is not None:
-            worker.attempts.has_triggered()
+            worker.attempts.mark_triggered()
         return emit(value, activity, stamp)
 
     return noted

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from functools import partial
 
-from hfg.engine.model import Doing, Task, Tasks
+from hfg.engine.model import Doing, Task
 from hfg.engine.model.current import current_task
 from hfg.engine.model.running_node import BACKOFF, DISABLED, TORN_DOWN, RunningNode
 from hfg.engine.rules.modifiers import derive_scopes
@@ -27,11 +27,7 @@ def has(worker: RunningNode) -> bool:
 
 
 def _of(worker: RunningNode) -> Doing:
-    if worker.tasks is None:
-        worker.start_tasks(Tasks(worker))
-        worker.core.rules.bind_ports(worker)  # what it sends is looked at from here on
-    doing: Doing = worker.tasks.doing
-    return doing
+    return worker.need_tasks().doing
 
 
 def entering(worker: RunningNode) -> None:
@@ -66,8 +62,8 @@ def afresh(worker: RunningNode) -> None:
 
 def go_on(worker: RunningNode) -> None:
     """Begin the do-activity if it is due, and neither the last one nor the state of its node keeps it back."""
-    tasks, core = worker.tasks, worker.core
-    if not tasks.doing.may_begin() or tasks.ending or not worker.lifecycle.is_up or worker.lifecycle.opening:
+    tasks, core = worker.need_tasks(), worker.core
+    if not tasks.doing.may_begin or tasks.ending or not worker.lifecycle.is_up or worker.lifecycle.opening:
         return
     if worker.blocked & _NOT_NOW or core.over:
         return
@@ -84,7 +80,7 @@ def begun(worker: RunningNode) -> None:
 def over(worker: RunningNode, task: Task, result: object, error: BaseException | None) -> BaseException | None:
     """It has ended: say so, and with what it returned if it came to its end by itself; gives back how it failed."""
     core = worker.core
-    worker.tasks.doing.over()
+    worker.need_tasks().doing.over()
     worker.node._outdated = None
     outcome: DoOutcome = "completed" if error is None else "failed"
     if task.cancelled and isinstance(error, asyncio.CancelledError | None):

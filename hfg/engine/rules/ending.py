@@ -110,8 +110,7 @@ def _ended(worker: RunningNode, result: object, error: BaseException | None) -> 
     send_automatic(worker)
     if core.trace is not None:
         core.trace(FiringEnded(core.now(), worker.path, worker.counts.firings, "ended" if error is None else "failed"))
-    worker.begin_releasing()
-    release(worker.release_early())
+    release(worker.begin_releasing())
     stamp = worker.stamp
     worker.leave()  # the firing is over; END is not part of it (A3)
     assert worker.ending is not None

@@ -173,7 +173,8 @@ def begin_over(worker: RunningNode, policy: str) -> bool:
     """X1: whether the node is to be restarted, and that is not under way already; from here on nothing of it begins."""
     restarts = policy == "restart" and not worker.blocked & BACKOFF
     if restarts:
-        worker.begin_restart()
+        worker.counts.add_restart()
+        worker.block(BACKOFF)
     return restarts
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.base.values import own_copy
-from hfg.engine.model.rate import SAME_MOMENT_S
+from hfg.engine.model.records import SAME_MOMENT_S
 from hfg.engine.model.running_node import DISABLED, NO_CALLS, UNREADY, RunningNode
 from hfg.engine.rules import sharing
 from hfg.engine.rules.agenda import consider, idle_again
@@ -131,7 +131,7 @@ def fire(worker: RunningNode, *, ends: bool = False) -> None:
         end(worker, edges, tokens)
     elif refused is not None:
         if worker.attempts is not None:
-            worker.attempts.begin_none()
+            worker.attempts.begin((), made=0)
         core.rules.fail(worker, f"firing {worker.counts.firings}", refused, answer=True)
     elif kind == "silent":
         worker.counts.add_silent()

@@ -277,7 +277,7 @@ def _not_ended(worker: RunningNode) -> None:
     """It starts afresh; a firing that was to end it behind others whose turn has not come is over with that (F14)."""
     concurrent, core = worker.concurrent, worker.core
     if concurrent is not None and concurrent.ending is not None and core.trace is not None:
-        core.trace(FiringEnded(core.now(), worker.path, concurrent.end_number, "abandoned"))
+        core.trace(FiringEnded(core.now(), worker.path, concurrent.ending.number, "abandoned"))
     worker.start_over()
 
 

@@ -53,7 +53,7 @@ def try_again(
       again: makes the next attempt.
     """
     options, core = worker.options, worker.core
-    if not _is_meant(error, options.retry_on) or not attempts.may_go_on(options.retries) or core.over:
+    if not _is_meant(error, options.retry_on) or not attempts.may_retry(options.retries) or core.over:
         return False
     pause_s = _pause(worker, number, attempts.made)
     worker.counts.add_retry()
@@ -70,7 +70,7 @@ def try_again(
     )
     if core.trace is not None:
         core.trace(FiringRetried(core.now(), worker.path, number, attempts.made, words, pause_s))
-    attempts.rest(core.after(pause_s, again))
+    attempts.wait(core.after(pause_s, again))
     return True
 
 

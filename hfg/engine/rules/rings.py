@@ -273,7 +273,7 @@ class _Walk:
             if not all([self._will_tell(reason, worker) for reason in self._reasons(worker)]):  # noqa: C419 - each
                 again.append(worker)
             if (worker, _ROOM) not in self._opened:
-                worker.room.tell_watchers()
+                worker.room.notify_watchers()
         return again
 
     def _reasons(self, held: RunningNode) -> Iterator[Action]:

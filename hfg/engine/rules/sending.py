@@ -272,7 +272,7 @@ def send_end(worker: RunningNode) -> None:
     end = (END, None, None)
     with deferring_events(core):
         assert worker.ending is not None
-        worker.send_as(worker.ending.send())
+        worker.send_as(worker.ending.stop_pending())
         since = len(core.next_in_wave)
         _put_outputs(worker, [end] * len(worker.out_edges))
         queue_next_in_wave(core, since)

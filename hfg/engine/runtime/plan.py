@@ -6,7 +6,7 @@ Stands on `graph.flat`, `running_node` and `wiring`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 from hfg.engine.model import Core, Gate, Group, Iteration, Scope
 from hfg.engine.model.running_node import DISABLED, STARTING, UNWIRED, RunningNode
@@ -110,7 +110,7 @@ class _Part:
         for flat_scope in self.flat.scopes:
             parent = self.scopes[flat_scope.parent] if flat_scope.parent is not None else None
             scope, owner = add_scope(core, flat_scope, parent, loop)
-            owner.lie_in(scope.and_around())
+            owner.enclose(scope.and_around())
             self.scopes.append(scope)
             self.owners.append(owner)
         for flat_scope, scope in zip(self.flat.scopes, self.scopes, strict=True):
@@ -188,66 +188,46 @@ class Ends:
             edge.join(self.of(flat.source), self.of(flat.target))
 
     def _outlet(self, name: str, group: Group) -> RunningNode:
-        outlet = RunningNode(self.core, "", None, None, self.loop if group.threaded else group)
-        outlet.be_graph_output(name)
-        self.core.workers.append(outlet)
+        outlet = self._make(name, "output", self.loop if group.threaded else group)
         self.core.outlets.append(outlet)
         return outlet
 
     def _inlet(self, end: End, group: Group) -> RunningNode:
-        """It is in the group of who takes from it: what it lays down is processed when all that follows is (F5)."""
-        inlet = RunningNode(self.core, "", None, None, group)
-        if end.kind == "event":
-            inlet.stand_outside(end.name)
-        else:
-            inlet.be_graph_input(end.name)
+        """It is in the group of its consumer: what it puts down is processed when all that follows is (F5)."""
+        inlet = self._make(end.name, "outside" if end.kind == "event" else "input", group)
         inlet.block(UNWIRED)  # it never fires
-        self.core.workers.append(inlet)
         self.core.inlets.append(inlet)
         return inlet
 
     def scopes_of(self, flat: FlatEdge) -> tuple[Scope, ...]:
-        """Give the scopes through whose ports an edge passes."""
+        """Return the scopes through whose ports an edge passes."""
         return tuple(self._scopes[scope] for scope in flat.via)
 
     def at_border(self, end: End, around: Iteration | None) -> RunningNode:
-        """Give who stands for a port of the graph itself, or for the inner side of one of what iterates."""
+        """Return the running node of a port of the graph itself, or of the inner side of a subgraph that iterates."""
         border = self.core if around is None else around
-        if end.kind == "output":
-            return _known(border.feeds, end.name) or self._feed(border, end.name, around)
-        if end.kind == "input":
-            return _known(border.readers, end.name) or self._reader(border, end.name, around)
         if end.kind == "observable":
-            outside = self._make()
-            outside.stand_outside(end.name)
-            return outside
-        assert self.core.boundary is not None
-        return self.core.boundary
+            return self._make(end.name, "outside", self.loop)
+        if end.kind not in ("input", "output"):
+            assert self.core.boundary is not None
+            return self.core.boundary
+        feeds = end.kind == "output"  # the graph's input is what inner edges start from
+        known = border.feeds if feeds else border.readers
+        port = next((node for node in known if node.port_name == end.name), None)
+        if port is None:
+            port = self._make(end.name, "input" if feeds else "output", self.loop)
+            known.append(port)
+            if around is not None and feeds:
+                port.be_within(around)  # a feed is not a member: what is to be let in does not move by itself
+            elif around is not None:
+                around.join(port)
+        return port
 
-    def _feed(self, border: Core | Iteration, name: str, around: Iteration | None) -> RunningNode:
-        feed = self._make()
-        feed.be_graph_input(name)
-        border.feeds.append(feed)
-        if around is not None:
-            feed.lie_within(around)
-        return feed
-
-    def _reader(self, border: Core | Iteration, name: str, around: Iteration | None) -> RunningNode:
-        reader = self._make()
-        reader.be_graph_output(name)
-        border.readers.append(reader)
-        if around is not None:
-            around.join(reader)
-        return reader
-
-    def _make(self) -> RunningNode:
-        worker = RunningNode(self.core, "", None, None, self.loop)
-        self.core.workers.append(worker)
-        return worker
-
-
-def _known(border: Sequence[RunningNode], name: str) -> RunningNode | None:
-    return next((worker for worker in border if worker.port_name == name), None)
+    def _make(self, name: str, kind: Literal["input", "output", "outside"], group: Group) -> RunningNode:
+        port = RunningNode(self.core, "", None, None, group)
+        port.be_port(name, kind)
+        self.core.workers.append(port)
+        return port
 
 
 def make_worker(core: Core, flat_node: FlatNode, groups: Mapping[str, Group]) -> RunningNode:
@@ -304,7 +284,9 @@ def wire(edge: Any, flat: FlatEdge) -> None:
     target: RunningNode = edge.target
     target.lead_in(edge, flat.target.kind, flat.target.name)
     if flat.source.kind == "event":
-        source.lead_out_of_event(edge, flat.source.name, flat.source.port)
+        named = source.node is not None or flat.source.name == "start"
+        event = source.make_event(flat.source.name, flat.source.port if named else None)
+        event.feed((*event.edges, edge))
     elif flat.source.kind != "observable":
         source.lead_out(edge, flat.source.kind, flat.source.name)
 
@@ -382,7 +364,6 @@ def watch_scope(scope: Scope) -> None:
         return
     scope.watch()
     for member in scope.inside():
-        member.tell(scope)
-        member.watch()
+        member.watch(scope)
         if member.core.started:
             rewire(member)  # no fast paths

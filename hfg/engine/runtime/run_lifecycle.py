@@ -352,7 +352,7 @@ class RunLifecycle:
                 worker.execution.eager_task.cancel()
         concurrent = [firing for worker in self._engine.core.workers for firing in worker.concurrent or ()]
         for firing in concurrent:
-            firing.in_time()
+            firing.end_attempt()
             if firing.eager_task is not None:
                 firing.eager_task.cancel()
         for task in code.aside:
@@ -380,7 +380,7 @@ class RunLifecycle:
         code = self._engine.code
         stuck: dict[RunningNode, str] = {}
         for firing in late:
-            code.interrupt_concurrent(firing)
+            code.interrupt(firing.worker, firing=firing)
             stuck.setdefault(firing.worker, f"firing {firing.number}")
         for worker in busy:
             region = worker.region

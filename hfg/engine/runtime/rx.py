@@ -112,7 +112,7 @@ class _EdgeScheduler(RunScheduler):
         pending.disposable = Disposable(self._over)  # once, whether it rings or is given up
         self._edge.ripen(1)
         if self._within is not None:
-            self._within.set_timer()
+            self._within.count_timer(1)
 
         def ring(scheduler: abc.SchedulerBase, state: Any) -> abc.DisposableBase | None:
             pending.dispose()
@@ -124,7 +124,7 @@ class _EdgeScheduler(RunScheduler):
     def _over(self) -> None:
         self._edge.ripen(-1)
         if self._within is not None:
-            self._within.timer_over()
+            self._within.count_timer(-1)
 
     def _work(self) -> None:
         self._at_work = True
