@@ -1,7 +1,8 @@
-"""Runs the code of nodes where it belongs: on the loop, as a coroutine, or in the thread of a group (rules R1, R6, X2).
+"""Runs the code of nodes where it belongs: on the loop, as a coroutine, or in a thread of the group (rules R1, R6, X2).
 
-What a node's code gives back is handed to whoever asked, at once or later, always on the loop. Stands on `eager_task`,
-`groups` and `virtual`.
+The result of a node's code is passed to the caller's `done`, at once or later, but always on the loop. A node, and each
+firing of one that allows several (F14), has at most one piece of code in progress. Both take the same path here; they
+differ only in where that is recorded, and in which eager task runs it.
 """
 
 from __future__ import annotations
