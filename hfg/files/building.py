@@ -1,8 +1,8 @@
-"""Makes a graph of a document, and finds everything that cannot be at once.
+"""Makes a graph of a graph file, and reports everything that is wrong with the file at once, with its lines.
 
-First every file that is included is read and what they would import is looked at; only then are node types imported,
-nodes added and edges connected, as if it were written by hand. What was found wrong is told with its line, and what
-only follows from that is not. Stands on `reading`, `boxes`, `missing` and `allowed`.
+First every included file is read, and everything that the files would import is checked; only then are node types
+imported and the graph made. Problems that only follow from others are not reported. Depends on `reading`, `boxes`,
+`missing` and `allowed`.
 """
 
 from __future__ import annotations
@@ -10,49 +10,33 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import partial
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final
 
-import msgspec
+from typing_extensions import override
 
 from hfg import registry
 from hfg.base.logs import Log
 from hfg.encoding import find_reference
 from hfg.errors import EngineInternalError, FileError, GraphError, HfgError, TargetError
 from hfg.files.allowed import Allowed
-from hfg.files.boxes import FileBox, box_type, file_box_type
-from hfg.files.document import (
-    NODE_OPTIONS,
-    BoxDocument,
-    Document,
-    EdgeDocument,
-    GateDocument,
-    InsideDocument,
-    NodeDocument,
-)
-from hfg.files.findings import Findings, Key, Lines, graph_path
+from hfg.files.boxes import FileBox, file_box_type
+from hfg.files.findings import Findings, graph_path
 from hfg.files.missing import MissingNode, missing_node
 from hfg.files.reading import Read, read_file
-from hfg.files.values import decoded, decoded_parameter
-from hfg.graph.editing.commands import Disconnect, Move, Remove
-from hfg.graph.editing.data import edge_as_meant
-from hfg.graph.editing.performing import perform
-from hfg.graph.editing.type_texts import type_of_text
-from hfg.graph.graph import Graph, Subgraph, graph_of
-from hfg.graph.structure.connecting import declare_edge
-from hfg.graph.structure.level import Level, inside, level_of
-from hfg.graph.structure.membership import set_options
+from hfg.graph.editing.boxes import box_type
+from hfg.graph.editing.document import NODE_OPTIONS, PORT_KINDS, BoxDocument, Document, NodeDocument
+from hfg.graph.editing.from_document import Builder, Key
+from hfg.graph.editing.making import fitting
+from hfg.graph.editing.steps import Steps
+from hfg.graph.graph import Graph, Subgraph
+from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.naming import suggest
-from hfg.graph.structure.options import GroupGiven, NodeGiven
-from hfg.graph.structure.pointing import node_at, source_at, target_at
-from hfg.graph.structure.refusals import raise_refusals
 from hfg.nodetypes.node import Node
 
 __all__ = ["box_of_file", "build", "load", "modules_of"]
 
 _LOGGER: Final = Log("hfg.files")
-_NOBODY: Final[Any] = None
 _current: ContextVar[_Loading | None] = ContextVar("hfg.files.loading", default=None)
 
 
@@ -62,7 +46,7 @@ def load(path: Path, allow: Iterable[str] = ()) -> Graph:
     read = loading.read(path.resolve(), str(path))
     if read is None:
         loading.findings.reject(f"{path} cannot be loaded")
-        raise EngineInternalError(f"{path} was not read, and nobody said why")
+        raise EngineInternalError(f"{path} was not read, and no problem was reported")
     graph = loading.graph(read, path.resolve())
     if unneeded := loading.allowed.unneeded():
         _LOGGER.warning("%s: %s", path, unneeded)
@@ -70,15 +54,15 @@ def load(path: Path, allow: Iterable[str] = ()) -> Graph:
 
 
 def build(document: Document, beside: Path, allow: Iterable[str] = ()) -> Graph:
-    """Make a graph of a document that no file needs to hold.
+    """Make a graph of a document that does not come from a file.
 
     Args:
       document: what the graph is.
-      beside: the file in whose place it stands: included files are named from its folder.
+      beside: the path that the document would have as a file: included files are named relative to its folder.
       allow: packages whose node types may be imported.
 
     Raises:
-      FileError: it cannot be made; `problems` holds every finding.
+      FileError: it cannot be made; `problems` lists everything.
     """
     loading = _Loading(beside, allow)
     return loading.graph(Read(document, {}, str(beside)), beside.resolve())
@@ -94,7 +78,7 @@ def box_of_file(path: Path) -> type[FileBox]:
     found = loading.box(path.resolve(), str(path), [])
     loading.findings.reject(f"{path} cannot be loaded")
     if found is None:
-        raise EngineInternalError(f"{path} was not read, and nobody said why")
+        raise EngineInternalError(f"{path} was not read, and no problem was reported")
     return found
 
 
@@ -110,7 +94,7 @@ class _Loading:
         self.files: dict[Path, Read | None] = {}
         self.types: dict[Path, type[FileBox] | None] = {}
         self.absent: list[tuple[str, int, str, str]] = []  # file, line and path of types that are not there, and why
-        self.later: list[tuple[int, Callable[[], None]]] = []  # what is done when all is built, the outer first
+        self.later: list[tuple[int, int, Callable[[], None]]] = []  # see `Builder.later`, for all files together
 
     def read(self, path: Path, file: str) -> Read | None:
         """Read a file, once."""
@@ -124,7 +108,7 @@ class _Loading:
         Raises:
           FileError: it cannot be.
         """
-        document, key = read.document, ()
+        document = read.document
         parts = self.parts(read, path, [path])
         if not self.may_import(read):
             self.findings.reject(f"{read.file} cannot be loaded", self.allowed.wanted)
@@ -136,17 +120,19 @@ class _Loading:
                     "another, by file: below a node, or declare inputs and outputs",
                 )  # fmt: skip
         graph = Graph(document.name or "graph")
-        with self.ours(), raise_refusals():
-            making = _Making(self, read, key, parts)
-            making.fill(graph, document, None)
-            making.note(graph, None, None, document.notes)
-            for _, step in sorted(self.later, key=lambda one: one[0]):
-                step()
+        with self.ours():
+            self.build(level_of(graph), read, parts).finish()
         if self.findings.problems:  # else the graph has them in their places, and its check reports them
             for file, line, at, why in self.absent:
                 self.findings.add(file, line, at, f"its type is not there: {why}; install what has it, or correct it")
         self.findings.reject(f"{read.file} cannot be loaded", self.allowed.wanted)
         return graph
+
+    def build(self, level: Level, read: Read, parts: Mapping[str, type[FileBox]]) -> Builder:
+        """Make what a file says at an empty level; whoever builds the outermost one also finishes it."""
+        builder = _Builder(self, level, read, parts)
+        builder.build(read.document)
+        return builder
 
     @contextmanager
     def ours(self) -> Iterator[None]:
@@ -244,25 +230,19 @@ class _Loading:
 
 
 def _filling(read: Read, parts: Mapping[str, type[FileBox]], path: Path) -> Callable[[Any, Graph], None]:
-    def fill(owner: Subgraph, graph: Graph) -> None:
+    """Return what fills the inside of a subgraph: as a part of the file that is being loaded, or by itself."""
+
+    def fill(_owner: Subgraph, graph: Graph) -> None:
         loading = _current.get()
         if loading is not None:
-            _Making(loading, read, (), parts).fill(graph, read.document, owner)
+            loading.build(level_of(graph), read, parts)
             return
         loading = _Loading(path, ())
-        with loading.ours(), raise_refusals():
-            _Making(loading, read, (), parts).fill(graph, read.document, owner)
-            for _, step in sorted(loading.later, key=lambda one: one[0]):
-                step()
+        with loading.ours():
+            loading.build(level_of(graph), read, parts).finish()
         loading.findings.reject(f"{read.file} cannot be loaded")
 
     return fill
-
-
-def _is_of(names: Set[str], port: str) -> bool:
-    """Whether that is the path of a port of one of these nodes."""
-    name, dot, _ = port.partition(".")
-    return bool(dot) and name in names
 
 
 def _nodes(box: BoxDocument, key: Key) -> Iterator[tuple[Key, NodeDocument]]:
@@ -294,7 +274,7 @@ def _references(document: Document, key: Key) -> Iterator[tuple[Key, str, bool]]
         if node.graph is not None:
             boxes.append(((*at, "graph"), node.graph))
     for at, box in boxes:
-        for kind in ("inputs", "outputs", "events", "slots"):
+        for kind in PORT_KINDS:
             for name, text in getattr(box, kind).items():
                 yield (*at, kind, name), text, True
         for name, parameter in box.parameters.items():
@@ -304,164 +284,77 @@ def _references(document: Document, key: Key) -> Iterator[tuple[Key, str, bool]]
                 yield (*at, "edges", number), operator.type, False
 
 
-class _Making:
-    """Makes what one document says."""
+class _Builder(Builder):
+    """Makes the contents of one file; reports instead of raising."""
 
-    def __init__(self, loading: _Loading, read: Read, key: Key, parts: Mapping[str, type[FileBox]]) -> None:
+    def __init__(self, loading: _Loading, level: Level, read: Read, parts: Mapping[str, type[FileBox]]) -> None:
+        super().__init__(level, Steps(level, loading.find))
         self.loading = loading
-        self.lines: Lines = read.lines
         self.read = read
-        self.key = key
         self.parts = parts
-        self.outermost: Graph = _NOBODY
-        self.gated: list[tuple[Graph, str, GateDocument, Key, Set[str]]] = []
+        self.later = loading.later
 
-    def wrong(self, key: Key, error: object, path: str | None = None) -> None:
-        """Report something."""
-        line = next((self.lines[key[:end]] for end in range(len(key), 0, -1) if key[:end] in self.lines), 0)
-        where = graph_path(key) if path is None else path
+    def wrong(self, key: Key, error: object, path: str = "") -> None:
+        """Report a problem with the line of the innermost part of the file that has one."""
+        lines = self.read.lines
+        line = next((lines[key[:end]] for end in range(len(key), 0, -1) if key[:end] in lines), 0)
+        where = path or graph_path(key)
         sentence = str(error).removeprefix(f'node "{where}": ')
         self.loading.findings.add(self.read.file, line, where, sentence)
 
+    @override
     @contextmanager
-    def told(self, key: Key, path: str | None = None) -> Iterator[None]:
-        """Report what is refused inside."""
+    def refusing(self, key: Key, path: str = "") -> Iterator[None]:
         try:
             yield
         except FileError as error:  # of a file that is included by a type
             self.loading.findings.problems += error.problems  # type: ignore[arg-type]
-        except HfgError as error:
-            self.wrong(key, error, path)
-        except ValueError as error:  # a value that breaks the limits of a parameter
+        except (HfgError, ValueError) as error:  # the latter: a value that violates the limits of a parameter
             self.wrong(key, error, path)
 
-    def fill(self, graph: Graph, box: BoxDocument, owner: Subgraph | None, key: Key | None = None) -> None:
-        """Make what is inside of a graph."""
-        key = self.key if key is None else key
-        if key == self.key:
-            self.outermost = graph
-        if isinstance(box, Document):
-            self.add_groups(graph, box, key)
-        if owner is None:
-            self.declare(graph, box, key)
-        for name, node in box.nodes.items():
-            with self.told((*key, "nodes", name)):
-                self.add(graph, box, name, node, (*key, "nodes", name))
-        lost = {name for name in (*box.nodes, *self.named(key)) if name not in graph.nodes}  # what is wrong was told
-        for number, edge in enumerate(box.edges):
-            if not (_is_of(lost, edge.source) or _is_of(lost, edge.target)):
-                with self.told((*key, "edges", number), f"{edge.source} -> {edge.target}"):
-                    self.connect(level_of(graph), edge, owner, (*key, "edges", number))
-        for name, path in ((name, path) for name, inner in box.promotes.items() for path in inner):
-            if path.partition(".")[0] not in lost:
-                with self.told((*key, "promotes", name)):
-                    self.promote(graph, box, owner, name, path, (*key, "promotes", name))
-        self.note_gates(graph, box, key, lost)
-        if key == self.key:
-            self.gate_all()
+    @override
+    def lost(self, key: Key) -> Set[str]:
+        return {str(one[-1]) for one in self.read.lost if one[:-2] == key}
 
-    def add_groups(self, graph: Graph, document: Document, key: Key) -> None:
-        """Declare the groups of a whole graph."""
-        for name, group in document.groups.items():
-            with self.told((*key, "groups", name), f'group "{name}"'):
-                graph.group(name, **cast(GroupGiven, {"threads": group.threads, **group.said()}))
+    @override
+    def may_differ(self, node: Node) -> bool:
+        return not isinstance(node, MissingNode)
 
-    def note_gates(self, graph: Graph, box: BoxDocument, key: Key, lost: Set[str]) -> None:
-        """Note the gates in a graph; they are made when all is there."""
-        for name, node in box.nodes.items():
-            if isinstance(graph.nodes.get(name), MissingNode):
-                node = msgspec.structs.replace(node, inside={})
-            for path, said, at in self.gates(name, node, (*key, "nodes", name)):
-                self.gated.append((graph, path, said, at, lost))
-
-    def gates(self, name: str, node: NodeDocument, key: Key) -> Iterator[tuple[str, GateDocument, Key]]:
-        """The gates of a node and of what is inside of it."""
-        if node.gate is not None:
-            yield name, node.gate, (*key, "gate")
-        if (not node.type and not node.file) or node.graph is None:
-            for path, inner in node.inside.items():
-                if inner.gate is not None:
-                    yield f"{name}/{path}", inner.gate, (*key, "inside", path, "gate")
-
-    def gate_all(self) -> None:
-        """Set the gates when all nodes are there, for any may be gated by any."""
-        for graph, path, said, key, lost in self.gated:
-            by, level = said.by, level_of(graph)
-            if by.startswith("/"):
-                outer = level_of(self.outermost)
-                prefix = level.path.removeprefix(outer.path).removeprefix("/")
-                graph, path, by = self.outermost, f"{prefix}/{path}" if prefix else path, by[1:]
-            elif by.partition("/")[0] in lost:
-                continue
-            if path.partition("/")[0] in lost:
-                continue
-            with self.told(key):
-                graph.gate(path, by=by, idle_rate_hz=said.idle_rate_hz)
-
-    def named(self, key: Key) -> Iterator[str]:
-        """The nodes that the file has there, also those whose lines are wrong."""
-        return (str(one[-1]) for one in self.read.lost if one[:-2] == key)
-
-    def declare(self, graph: Graph, box: BoxDocument, key: Key) -> None:
-        """The ports of a whole graph."""
-        for kind, declare in (("inputs", graph.input), ("outputs", graph.output)):
-            for name, text in getattr(box, kind).items():
-                with self.told((*key, kind, name)):
-                    declare(name, type_of_text(text, f'{kind[:-1]} "{name}"'))
-
-    # --- nodes ---
-
-    def add(self, graph: Graph, box: BoxDocument, name: str, said: NodeDocument, key: Key) -> None:
-        made = self.made(graph, box, name, said, key)
-        if made is None:
-            return
+    @override
+    def add(self, level: Level, name: str, node: Node, said: NodeDocument, key: Key) -> None:
         try:
-            graph.add(made, name=name, **cast(NodeGiven, said.said()))
+            super().add(level, name, node, said, key)
         except GraphError as error:
-            given = (option for option in NODE_OPTIONS if (*key, option) in self.lines and option in str(error))
+            given = (one for one in NODE_OPTIONS if (*key, one) in self.read.lines and one in str(error))
             self.wrong((*key, next(given, "type")), error, graph_path(key))
-            if graph.nodes.get(name) is not made:
-                graph.add(made, name=name)  # without its options, so that its edges are looked at, too
-        if said.graph is not None and said.type and inside(made) is not None:
-            self.fill_anew(made, said.graph, key)
-        self.note(graph, made, said.position, said.notes)
-        if isinstance(made, MissingNode):
-            return
-        for path, other in said.inside.items():
-            step = _Step(self, made, path, other, (*key, "inside", path))
-            self.loading.later.append((level_of(graph).depth, step))
+            if level.nodes.get(name) is not node:
+                self.steps.add(level, name, node, {})  # without its options, so that its edges are checked, too
 
-    def made(self, graph: Graph, box: BoxDocument, name: str, said: NodeDocument, key: Key) -> Any:
-        """Make a node that is in no graph yet; None if it cannot be, which is reported."""
+    @override
+    def make(self, level: Level, name: str, said: NodeDocument, key: Key, box: BoxDocument) -> Node | None:
+        kind: Any = None
         if said.file:
-            kind: Any = self.parts.get(said.file)
-            if kind is None:
-                return None
+            kind = self.parts.get(said.file)  # None if the file is wrong, which was reported
         elif said.type:
             try:
                 kind = registry.find(said.type)
             except registry.NotANodeType as error:
                 self.wrong((*key, "type"), error, graph_path(key))
-                return None
             except TargetError as error:
-                where = f"{self.read.file}, line {self.lines.get((*key, 'type'), 0)}"
-                self.loading.absent.append(
-                    (self.read.file, self.lines.get((*key, "type"), 0), graph_path(key), str(error))
-                )
-                return missing_node(said, name, box.edges, str(error), where)
+                line = self.read.lines.get((*key, "type"), 0)
+                self.loading.absent.append((self.read.file, line, graph_path(key), str(error)))
+                return missing_node(said, name, box.edges, str(error), f"{self.read.file}, line {line}")
         else:
             assert said.graph is not None
-            inner = said.graph
-            kind = box_type(
-                inner,
-                graph_path(key),
-                lambda owner, face: self.fill(face, inner, owner, (*key, "graph")),
-                lambda what, port, sentence: self.wrong((*key, "graph", what, port), sentence),
-                self.loading.find,
-            )
-        return self.node_of(kind, said, key)
 
-    def node_of(self, kind: Any, said: NodeDocument, key: Key) -> Any:
+            def report(what: str, port: str, sentence: str) -> None:
+                self.wrong((*key, "graph", what, port), sentence)
+
+            kind = box_type(level.whole.box_type, said.graph, {}, report, self.loading.find)
+        return None if kind is None else self.node_of(kind, said, key)
+
+    def node_of(self, kind: Any, said: NodeDocument, key: Key) -> Node | None:
+        """Make a node of a type; each parameter that is wrong is reported in its line."""
         specs = kind._type.parameters
         values: dict[str, Any] = {}
         for name, data in said.parameters.items():
@@ -471,116 +364,17 @@ class _Making:
                 hint = "inputs are connected by edges, not given here" if name in kind._type.inputs else ""
                 self.wrong(at, f'there is no parameter "{name}"; {hint or suggest(name, known)}')
                 continue
-            with self.told(at):
-                values[name] = decoded_parameter(specs[name], data, self.loading.find)
-            if name not in values:
-                continue
-            wrong = None if specs[name].size else specs[name].check(values[name])
-            if wrong is not None:
-                del values[name]
-                self.wrong(at, f"{wrong}; correct the value, or take it out")
+            with self.refusing(at):
+                value = fitting(specs[name], data, self.loading.find)
+                problem = None if specs[name].size else specs[name].check(value)
+                if problem is None:
+                    values[name] = value
+                else:
+                    self.wrong(at, f"{problem}; correct the value, or remove it")
         try:
-            return kind(**values)
+            node: Node = kind(**values)
         except (TypeError, ValueError) as error:
-            if any(name not in values for name in said.parameters):
-                return None  # it was told
-            self.wrong((*key, "parameters"), error, graph_path(key))
+            if all(name in values for name in said.parameters):  # otherwise it was reported
+                self.wrong((*key, "parameters"), error, graph_path(key))
             return None
-
-    def fill_anew(self, made: Subgraph, box: BoxDocument, key: Key) -> None:
-        """What is inside is not what the type builds: it is taken out first."""
-        within = inside(made)
-        assert within is not None
-        within.promotions.become({})
-        root = within.whole.root
-        perform(root, [Disconnect(edge.source.path, edge.target.path) for edge in reversed(within.edges)])
-        perform(root, [Remove(within.path_to(name)) for name in list(within.nodes)])
-        self.fill(graph_of(within.face), box, made, (*key, "graph"))
-
-    def note(self, graph: Graph, node: Node | None, position: list[Any] | None, notes: dict[str, Any]) -> None:
-        """What editors noted."""
-        noted = ({} if position is None else {"position": position}) | notes
-        if noted:
-            level_of(graph).whole.notes[node] = noted
-
-    # --- edges ---
-
-    def connect(self, level: Level, said: EdgeDocument, owner: Subgraph | None, key: Key) -> None:
-        source = _end(level, said.source, owner, ("inputs", "slots"), source_at)
-        target = _end(level, said.target, owner, ("outputs", "events"), target_at)
-        where = f'"{said.source}" -> "{said.target}"'
-        options = edge_as_meant(said.said(), target, where, partial(decoded, find=self.loading.find))
-        declare_edge(level, source, target, options)
-
-    def promote(self, graph: Graph, box: BoxDocument, owner: Subgraph | None, name: str, path: str, key: Key) -> None:
-        if owner is None:
-            return  # a whole graph has none, which was told
-        if name not in owner.ports.parameters:
-            raise GraphError(f'there is no parameter "{name}" to promote to; {suggest(name, owner.ports.parameters)}')
-        node_name, dot, parameter = path.partition(".")
-        node = graph.nodes.get(node_name)
-        if not dot or node is None or parameter not in node.ports.parameters:
-            known = [f"{one}.{each}" for one, inner in graph.nodes.items() for each in inner.ports.parameters]
-            raise GraphError(f'"{path}" is no parameter inside; {suggest(path, known)}')
-        graph.promote(owner.ports.parameters[name], node.ports.parameters[parameter])
-        said = box.nodes[node_name].parameters if node_name in box.nodes else {}
-        if parameter in said:  # which is another value than that of the subgraph
-
-            def set_again() -> None:
-                with self.told(key):
-                    node._set_parameter(
-                        parameter,
-                        decoded_parameter(node._type.parameters[parameter], said[parameter], self.loading.find),
-                    )
-
-            self.loading.later.append((level_of(graph).depth, set_again))
-
-
-class _Step:
-    """Lets something be otherwise inside of a subgraph, when all is built."""
-
-    def __init__(self, making: _Making, box: Node, path: str, said: InsideDocument, key: Key) -> None:
-        self.making, self.box, self.path, self.said, self.key = making, box, path, said, key
-
-    def __call__(self) -> None:
-        making, said, key = self.making, self.said, self.key
-        within = inside(self.box)
-        with making.told(key):
-            if within is None:
-                raise GraphError("nothing is inside, for this is no subgraph; take these lines out")
-            node = node_at(within, self.path)
-            for name, data in said.parameters.items():
-                with making.told((*key, "parameters", name)):
-                    specs = node._type.parameters
-                    if name not in specs:
-                        raise GraphError(f'there is no parameter "{name}"; {suggest(name, specs)}')
-                    node._set_parameter(name, decoded_parameter(specs[name], data, making.loading.find))
-            if said.enabled is not None:
-                set_options(node, msgspec.structs.replace(node._options, enabled=said.enabled))
-            if said.group is not None:
-                perform(within.whole.root, [Move(node.place.path, said.group or None)])
-            if said.position is not None or said.notes:
-                before = within.whole.notes.get(node, {})
-                noted = ({} if said.position is None else {"position": said.position}) | said.notes
-                within.whole.notes[node] = before | noted
-
-
-def _end(
-    level: Level,
-    path: str,
-    owner: Subgraph | None,
-    kinds: tuple[str, str],
-    at: Callable[[Level, str], Any],
-) -> Any:
-    """Find one end of an edge; a name alone is a port of the subgraph itself, or of the whole graph."""
-    whole = path.removeprefix("/")
-    if owner is None or "." in path or whole != path:
-        return at(level, whole)
-    for kind in kinds:
-        ports = getattr(owner.ports, kind)
-        if path in ports:
-            return ports[path].inner
-    if path in level.ports.by_name():
-        return at(level, path)
-    known = [name for kind in kinds for name in getattr(owner._type, kind)]
-    raise GraphError(f'the subgraph has no "{path}" that could be here; {suggest(path, known)}')
+        return node

@@ -10,8 +10,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from hfg.errors import EngineInternalError, UsageError
-from hfg.files.document import SUFFIX, Document
+from hfg.files.opening import SUFFIX
 from hfg.graph import Graph
+from hfg.graph.editing.document import Document
 
 __all__ = ["build", "describe", "load", "read", "save", "schema", "text_of", "write"]
 
@@ -150,7 +151,7 @@ def schema(*, types: bool = False, allow: Iterable[str] = ()) -> str:
     Raises:
       UsageError: a package cannot be imported.
     """
-    from hfg.files.schema import json_schema, schema_text
+    from hfg.files.json_schema import json_schema, schema_text
 
     if not types and not allow:
         return schema_text(json_schema())

@@ -6,11 +6,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
 from hfg.errors import FileError, Problem
+from hfg.graph.editing.from_document import Key
 
-__all__ = ["FileProblem", "Findings", "Key", "Lines", "graph_path", "split"]
-
-Key: TypeAlias = tuple[str | int, ...]
-"""Where something stands in a document: ("nodes", "camera", "parameters", "rate_hz"), ("edges", 3)."""
+__all__ = ["FileProblem", "Findings", "Lines", "graph_path", "split"]
 
 Lines: TypeAlias = Mapping[Key, int]
 

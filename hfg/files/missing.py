@@ -14,8 +14,8 @@ from typing import Any, ClassVar, Final
 from typing_extensions import override
 
 from hfg.errors import Problem
-from hfg.files.document import EdgeDocument, NodeDocument
 from hfg.graph.checks.checking import also
+from hfg.graph.editing.document import EdgeDocument, NodeDocument
 from hfg.graph.flat.flattening import FlatGraph
 from hfg.graph.structure.option import having
 from hfg.graph.structure.options import EdgeFields

@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import difflib
 from pathlib import Path
+from typing import Final
 
 from hfg.base.bounds import GRAPH_FILE_BYTES
 from hfg.files.findings import Findings
 
-__all__ = ["bytes_of", "text_in"]
+__all__ = ["SUFFIX", "bytes_of", "text_in"]
+
+SUFFIX: Final = ".hfg.yaml"
+"""How the names of graph files end."""
 
 
 def bytes_of(path: Path, file: str, findings: Findings, *suffixes: str) -> bytes | None:

@@ -16,10 +16,11 @@ import msgspec
 from msgspec import inspect
 
 from hfg.base.controls import name_problem
-from hfg.files.document import SUFFIX, VERSION, Document, EdgeDocument, NodeDocument, OperatorDocument
-from hfg.files.findings import Findings, Key, Lines, graph_path
-from hfg.files.opening import bytes_of, text_in
+from hfg.files.findings import Findings, Lines, graph_path
+from hfg.files.opening import SUFFIX, bytes_of, text_in
 from hfg.files.parsing import Located, parse, plain
+from hfg.graph.editing.document import VERSION, Document, EdgeDocument, NodeDocument, OperatorDocument
+from hfg.graph.editing.from_document import Key
 
 __all__ = ["Read", "read_bytes", "read_file"]
 

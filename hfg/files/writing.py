@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from hfg.base.whole import write_whole
-from hfg.files.document import (
+from hfg.files.emitting import emit
+from hfg.graph.editing.document import (
     NODE_OPTIONS,
     VERSION,
     BoxDocument,
@@ -16,7 +17,6 @@ from hfg.files.document import (
     NodeDocument,
     OperatorDocument,
 )
-from hfg.files.emitting import emit
 
 __all__ = ["text_of", "write_text"]
 

@@ -21,7 +21,7 @@ from hfg.errors import Problem, UsageError
 from hfg.graph.checks.checking import check
 from hfg.graph.editing import transactions
 from hfg.graph.editing.commands import Command
-from hfg.graph.editing.telling import as_commands
+from hfg.graph.editing.to_commands import as_commands
 from hfg.graph.structure.adding import add
 from hfg.graph.structure.assigning import declare_group, move
 from hfg.graph.structure.boundary import GraphInput, GraphOutput
@@ -480,7 +480,7 @@ class Graph:
         return self._level.whole.run
 
 
-def _need_known(kind: type[Fields], options: Iterable[str], call: str) -> None:
+def _need_known(kind: type[Fields[Any]], options: Iterable[str], call: str) -> None:
     """Refuse what Python refuses of a call whose arguments are written out."""
     wrong = unknown(kind, options, call) if options else None
     if wrong is not None:

@@ -75,7 +75,7 @@ def test_everything_that_is_wrong_is_told_at_once_with_its_line() -> None:
         'a.hfg.yaml:4: group "side": threads is a whole number, got the text "many"; correct it, or take it out',
         'a.hfg.yaml:8: "camera.max_rate_hz": max_rate_hz is a number, got the text "fast"; correct it, or take it out',
         'a.hfg.yaml:10: "camera.cuont": there is no parameter "cuont"; did you mean "count"?',
-        'a.hfg.yaml:11: "camera.count": must be of type int, got 1.5; correct the value, or take it out',
+        'a.hfg.yaml:11: "camera.count": must be of type int, got 1.5; correct the value, or remove it',
         'a.hfg.yaml:13: "lost.typ": nothing here is called "typ"; did you mean "type"?',
         'a.hfg.yaml:16: "blur.on_error": on_error is one of disable, restart, skip, stop, got the text "skp"; did you '
         'mean "skip"?',
@@ -97,7 +97,7 @@ def test_types_that_are_not_there_are_told_with_what_else_is_wrong() -> None:
     ) == [
         'a.hfg.yaml:3: "lost": its type is not there: node type "hfg.testing.nodes:Scrpt": module "hfg.testing.nodes" '
         'has no "Scrpt" (did you mean "Script"?); install what has it, or correct it',
-        'a.hfg.yaml:4: "numbers.count": must be of type int, got [3]; correct the value, or take it out',
+        'a.hfg.yaml:4: "numbers.count": must be of type int, got [3]; correct the value, or remove it',
     ]
 
 
@@ -200,7 +200,7 @@ BOX = "hfg: 1\nnodes:\n  b:\n    graph:\n      parameters:\n        p: "
         ("hfg: 1\nnodes:\n  a: {type: 'xml.dom.pulldom:x'}", '3: "a.type": module "xml.dom.pulldom" is not one that'),
         ("hfg: 1\ninputs: {a: wave.Wave_read}", '2: "a": module "wave" is not one that this file may import'),
         (BOX + "{type: int, default: 1, choices: [1], labels: [a, b]}", '6: "b.p": labels are what to call the ch'),
-        (BOX + "{type: int, default: 1, shown_if: {q: {gtt: 3}}}", '6: "b.p": "gtt" is no limit; there are gt, ge'),
+        (BOX + "{type: int, default: 1, shown_if: {q: {gtt: 3}}}", '6: "b.p": "gtt" is not a limit; there are gt, ge'),
         (BOX + "{type: int, default: 1, shown_if: q}", 'parameter "p" is shown by "q", which is not a parameter'),
         (BOX + "{type: int, default: 1, shown_if: 3}", "shown_if names parameters of the same node and what they must"),
         (BOX + "{type: int, default: 1, step: 0}", 'parameter "p" has a step of 0'),

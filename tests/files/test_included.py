@@ -155,3 +155,19 @@ def test_files_include_files_that_include_files() -> None:
     assert Path("top.hfg.yaml").read_text() == (
         "hfg: 1\nname: graph\nnodes:\n  m:\n    file: parts/middle.hfg.yaml\n    parameters:\n      by: 6\n"
     )
+
+
+def test_what_a_file_says_about_the_inside_of_an_included_file_counts_more_than_what_that_says() -> None:
+    """At any depth: the outermost file decides."""
+    Path("parts/middle.hfg.yaml").write_text(
+        "hfg: 1\nnodes:\n  inner: {file: follow.hfg.yaml, inside: {double: {parameters: {factor: 4}}}}\n"
+    )
+    Path("top.hfg.yaml").write_text(
+        "hfg: 1\nnodes:\n  a: {file: parts/middle.hfg.yaml}\n"
+        "  b: {file: parts/middle.hfg.yaml, inside: {inner/double: {parameters: {factor: 9}}}}\n"
+    )
+    graph = load("top.hfg.yaml")
+    assert [graph[f"{name}/inner/double"]._parameters["factor"] for name in ("a", "b")] == [4, 9]
+    text = text_of(describe(graph, beside="top.hfg.yaml"))
+    save(graph, "top.hfg.yaml")
+    assert text_of(describe(load("top.hfg.yaml"), beside="top.hfg.yaml")) == text

@@ -15,13 +15,22 @@ from reactivex import operators as ops
 
 import hfg
 from hfg.base.values import same
-from hfg.files import build, describe, text_of
+from hfg.files import Document, build, describe, text_of
+from hfg.files.findings import Findings
+from hfg.files.reading import read_bytes
 from hfg.testing.plans import GraphPlan
 from hfg.types import Shape
 from tests.files.programs import Ear, Merged, Mode, Pose, Scaling, difference, double, numbers, plan_of, shown
 from tests.support.shrinking import shrink
 
 Turn = Annotated[NDArray[np.float64], Shape(3, 3)]
+
+
+def read_text(text: str) -> Document:
+    """What a file with this text says."""
+    found = read_bytes(text.encode(), "a.hfg.yaml", Findings())
+    assert found is not None
+    return found.document
 
 
 def again(graph: hfg.Graph) -> hfg.Graph:
@@ -134,6 +143,13 @@ def test_values_of_parameters_come_back_in_their_types() -> None:
         "no: #1 \u2028",
     ]
     assert again(graph)["numbers"]._parameters["step"] == float("inf")
+
+
+def test_the_loop_keeps_its_policy() -> None:
+    graph = hfg.Graph()
+    graph.group("loop", policy="priority")
+    assert again(graph).groups["loop"].policy == "priority"
+    assert build(read_text("hfg: 1\ngroups: {loop: {policy: fair}}\n")).groups["loop"].policy == "fair"
 
 
 def test_vectors_of_ports_keep_their_size() -> None:

@@ -461,11 +461,11 @@ def _untold() -> dict[str, tuple[Callable[[hfg.Graph], object], str]]:
     return {
         "a type without a name": (
             lambda graph: graph.add(local(), name="here"),
-            'node "here": its type .*local cannot be found by name, so no command can make it; define it at the top',
+            'node "here": its type .*local cannot be found by name; define it at the top',
         ),
         "an observable": (
             observable,
-            'edge "observable -> sink.value": an observable from outside is code, .* feed the graph by graph.input',
+            'edge "observable -> sink.value": an observable from outside is code; .* feed the graph by graph.input',
         ),
         "an operator without a name": (
             lambda graph: graph.connect(graph.start, graph.add(sink()).activate, through=[ops.skip(1)]),
@@ -479,7 +479,7 @@ def _untold() -> dict[str, tuple[Callable[[hfg.Graph], object], str]]:
         ),
         "a type without a text": (
             lambda graph: graph.input("in", Annotated[int, at.Gt(3)]),
-            'input "in" of the graph: its type .* has no name, so no command can say it; give it one in a module',
+            'input "in" of the graph: its type .* has no name; give it one in a module',
         ),
     }
 
@@ -718,7 +718,7 @@ REFUSED = [
     (c.Connect("script.out", "text.word"), "port types do not fit"),
     (c.Disconnect("first.out", "sink.value"), 'there is no edge "first.out" -> "sink.value"'),
     (c.SetParameter("first.size", 1), 'there is no "first.size": "first" has no parameter "size"; there are none'),
-    (c.Rename("first", "second"), 'graph "chain" has a node "second" already; choose another name'),
+    (c.Rename("first", "second"), 'graph "chain" already has a node "second"; choose another name'),
     (c.Rename("first", "a/b"), '"/" separates the parts of a path'),
     (c.Copy("first", "sink/x"), '"sink" is no subgraph, so nothing is inside it'),
     (c.Add("no_such_module:x", "x"), 'node "x": node type "no_such_module:x": no module named "no_such_module"'),
@@ -731,7 +731,7 @@ REFUSED = [
     (c.Enclose((), "box"), "made of at least one node"),
     (c.Enclose(("first",), "second"), "has a node of this name already"),
     ("remove first", "an edit takes commands"),
-    (c.Ungate("first"), '"first" has no gate that could be taken away'),
+    (c.Ungate("first"), '"first" has no gate that could be removed'),
     (c.Gate("first", "secnod"), 'there is no "secnod"'),
     (c.Gate("first", "second", -1), "idle_rate_hz must be a number above 0, or None to rest, got -1"),
     (c.Add("hfg.testing.nodes:double", "x", None), "Add takes parameters as a dict by name, got None"),  # type: ignore[arg-type]
@@ -771,13 +771,13 @@ REFUSED = [
     (c.Note("frist", "x", 1), 'there is no "frist"'),
     (c.Note("first", "x", object()), 'note "x" of "first": notes are plain data, got <object'),
     (c.Note("first", 3, 1), "Note takes name as a text, got 3"),  # type: ignore[arg-type]
-    (c.AddGroup("busy"), 'group "busy" is declared already, as GroupSpec('),
+    (c.AddGroup("busy"), 'group "busy" is already declared as GroupSpec('),
     (c.AddGroup("two", threads=-2), 'group "two": threads must be 0 (on the loop), 1 (a thread of its own) or'),
     (c.AddGroup(""), "a group needs a name, got ''"),
     (c.ChangeGroup("bsuy"), 'there is no group "bsuy"; did you mean "busy"?'),
     (c.ChangeGroup("loop", threads=1), 'group "loop": it is the event loop itself and takes no thread'),
     (c.ChangeGroup("busy", policy="quick"), 'group "busy": policy must be one of'),  # type: ignore[arg-type]
-    (c.RemoveGroup("busy"), 'group "busy" cannot be removed, for "join" runs in it; move it with Move first'),
+    (c.RemoveGroup("busy"), 'cannot remove group "busy": "join" runs in it; move it with Move first'),
     (c.RemoveGroup("loop"), 'group "loop" is the event loop itself and is always there'),
     (c.RemoveGroup("gone"), 'there is no group "gone"'),
     (c.RemoveGroup(["busy"]), "RemoveGroup takes name as a text, got ['busy']"),  # type: ignore[arg-type]
@@ -791,8 +791,8 @@ REFUSED = [
     (c.AddSubgraph("box", {"a b": "int"}), "subgraph \"box\": a port cannot be called 'a b'; choose another name"),
     (c.AddSubgraph("box", {"graph": "int"}), "subgraph \"box\": a port cannot be called 'graph'"),
     (c.AddSubgraph("box", {"a": "int"}, {"a": "int"}), 'subgraph "box": it has two ports "a"'),
-    (c.AddSubgraph("box", {"a": "itn"}), 'port "box.a": "itn" is no type (there is no itn)'),
-    (c.AddSubgraph("box", {"a": 3}), 'port "box.a": a type is given as a text, got 3'),  # type: ignore[dict-item]
+    (c.AddSubgraph("box", {"a": "itn"}), 'subgraph "box": port "a": "itn" is no type (there is no itn)'),
+    (c.AddSubgraph("box", {"a": 3}), 'subgraph "box": port "a": a type is given as a text, got 3'),  # type: ignore[dict-item]
     (c.AddSubgraph("first"), 'graph "chain" has a node "first" already'),
     (c.AddSubgraph("box", {}, {}, {}, {}, {"rate": 3}), "options are those of graph.add"),  # type: ignore[typeddict-unknown-key]
 ]

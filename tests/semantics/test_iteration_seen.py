@@ -291,7 +291,9 @@ def test_what_iterates_may_come_go_and_be_renamed_while_the_graph_runs() -> None
 
 def test_a_gate_does_not_reach_over_the_border_by_a_command() -> None:
     graph, _ = graph_of(Each())
-    with pytest.raises(GraphError, match='"each/first" and "source" lie on two sides of the border of a subgraph'):
+    with pytest.raises(
+        GraphError, match='"each/first" and "source" are on different sides of the boundary of a subgraph'
+    ):
         graph.edit(c.Gate("each/first", "source"))
     graph.edit(c.Gate("each/first", "each/second"))
     assert graph.check() == [] or all(problem.check != "gate-border" for problem in graph.check())

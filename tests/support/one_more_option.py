@@ -19,16 +19,16 @@ from typing import Any
 MODULE = "hfg.graph.structure.options"
 DECLARED = (
     (
-        "class EdgeFields(Fields, kw_only=True):\n",
+        "class EdgeFields(Fields[EdgeGiven[Any, Any]], kw_only=True):\n",
         "    max_age_s: Annotated[float | None, Option('No signal waits longer.', above=0, only='events', "
         "badge='{:g} s')] = None\n",
     ),
     (
-        "class NodeFields(Fields, kw_only=True):\n",
+        "class NodeFields(Fields[NodeGiven], kw_only=True):\n",
         "    weight: Annotated[int, Option('Its share of the processor.', least=1, badge='weight {}')] = 1\n",
     ),
     (
-        "class GroupFields(Fields, kw_only=True):\n",
+        "class GroupFields(Fields[GroupGiven], kw_only=True):\n",
         "    nice: Annotated[int, Option('As of ours.', least=0)] = 0\n",
     ),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from hfg.graph import EdgeOptions, GroupSpec, NodeOptions
 from hfg.graph.structure.option import Fields, declared
@@ -18,10 +18,10 @@ _ONLY: Final = {
     "any": "",
     "subgraph": "Only for subgraphs.",
 }
-KINDS: Final[dict[str, type[Fields]]] = {"an edge": EdgeOptions, "a node": NodeOptions, "a group": GroupSpec}
+KINDS: Final[dict[str, type[Fields[Any]]]] = {"an edge": EdgeOptions, "a node": NodeOptions, "a group": GroupSpec}
 
 
-def table(kind: type[Fields]) -> str:
+def table(kind: type[Fields[Any]]) -> str:
     """Return the options of a struct as a table in Markdown."""
     rows = ["| option | values | default | |", "|---|---|---|---|"]
     for one in declared(kind).values():

@@ -16,8 +16,8 @@ from hfg.files.apex.ports import AUTOMATIC, Missing, Ports, is_source, parts
 from hfg.files.apex.reading import SEPARATOR
 from hfg.files.apex.report import ConversionReport, Converted
 from hfg.files.apex.table import ParameterRule, TypeRule, rule_of
-from hfg.files.document import BoxDocument, Document, EdgeDocument, GroupDocument, NodeDocument
 from hfg.files.findings import Findings
+from hfg.graph.editing.document import BoxDocument, Document, EdgeDocument, GroupDocument, NodeDocument
 
 __all__ = ["convert"]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from hfg.errors import EngineInternalError
 from hfg.files.apex.report import ConversionReport
-from hfg.files.document import Document
 from hfg.graph import Graph
+from hfg.graph.editing.document import Document
 
 __all__ = ["load", "read"]
 

@@ -15,9 +15,9 @@ from hfg.errors import FileError
 from hfg.files.apex.report import ConversionReport
 from hfg.files.apex.table import rule_of
 from hfg.files.building import build
-from hfg.files.document import BoxDocument, Document, EdgeDocument, NodeDocument
 from hfg.files.missing import MissingNode
 from hfg.graph import Graph
+from hfg.graph.editing.document import BoxDocument, Document, EdgeDocument, NodeDocument
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.pointing import node_at
 from hfg.nodetypes.node import Node

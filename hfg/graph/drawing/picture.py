@@ -417,7 +417,7 @@ def _details(options: NodeOptions, kind: NodeType) -> list[str]:
 
 def _badges(options: EdgeOptions | NodeOptions) -> list[str]:
     """Return what a drawing shows of options that are not as usual."""
-    known, said = declared(type(options)), options.said()
+    known, said = declared(type(options)), dict(options.said())
     ranked = sorted(said, key=lambda name: known[name].option.rank)
     return [badge for name in ranked if (badge := known[name].badge(said[name]))]
 

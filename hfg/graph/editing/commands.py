@@ -217,6 +217,9 @@ class Connect(Command, EdgeSaid, frozen=True):  # type: ignore[misc]  # nobody c
 
     source: str
     target: str
+    if TYPE_CHECKING:
+
+        def __init__(self, source: str, target: str, **options: Unpack[EdgeGiven[Any, Operator]]) -> None: ...
 
 
 class Disconnect(Command, frozen=True):

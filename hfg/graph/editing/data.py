@@ -5,13 +5,14 @@ Values on an edge and what operators are given become data; operators go by the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, TypeAlias
+from collections.abc import Callable
+from typing import Any, TypeAlias, cast
 
 from hfg.errors import EncodingError, GraphError
 from hfg.graph.editing.commands import Operator
 from hfg.graph.structure.edge import Edge, TargetEnd, type_of
 from hfg.graph.structure.operators import NamedOperator, find_operator
+from hfg.graph.structure.options import EdgeGiven
 
 __all__ = ["Convert", "edge_as_data", "edge_as_meant"]
 
@@ -19,7 +20,7 @@ Convert: TypeAlias = Callable[[Any, Any], Any]
 """Makes data of a value, or a value of data; takes the type as well."""
 
 
-def edge_as_data(edge: Edge, encode: Convert) -> dict[str, Any]:
+def edge_as_data(edge: Edge, encode: Convert) -> EdgeGiven[Any, Operator]:
     """Return what is said of an edge.
 
     Raises:
@@ -50,13 +51,15 @@ def _operator_as_data(operator: object, encode: Convert) -> Operator:
         raise GraphError(f"its operator {operator!r:.80} is not made of plain data: {error}; give it others") from error
 
 
-def edge_as_meant(said: Mapping[str, Any], target: TargetEnd, where: str, decode: Convert) -> dict[str, Any]:
+def edge_as_meant(
+    said: EdgeGiven[Any, Operator], target: TargetEnd, where: str, decode: Convert
+) -> EdgeGiven[Any, NamedOperator]:
     """Return the options that are said of an edge; what is not even a list is refused with the edge.
 
     Raises:
       GraphError: an operator is not said by name, or cannot be made; the message begins with `where`.
     """
-    found = dict(said)
+    found = cast(EdgeGiven[Any, Any], dict(said))
     if isinstance(said.get("initial"), tuple | list):
         found["initial"] = tuple(decode(one, type_of(target)) for one in said["initial"])
     if "through" in said:

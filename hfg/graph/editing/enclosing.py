@@ -7,10 +7,11 @@ Each edge over the border gets a port of its own, in order, so that what a node 
 from __future__ import annotations
 
 import types
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeAlias
 
-from hfg.errors import GraphError, HfgError
+from hfg.errors import GraphError
+from hfg.graph.editing.boxes import DECLARED, is_free
 from hfg.graph.editing.changes import Change, EdgeChange, GateChange, NodeChange, PromotionChange
 from hfg.graph.editing.straight import refuse_other_queues
 from hfg.graph.structure.connecting import refuse
@@ -21,47 +22,12 @@ from hfg.graph.structure.naming import need_name
 from hfg.graph.structure.options import PLAIN_NODE, EdgeOptions, in_group
 from hfg.graph.structure.subgraph import Box
 from hfg.nodetypes.node import Node
-from hfg.ports import Event, InnerSource, InnerTarget, Input, Output, ParameterPort, Port, slot
+from hfg.ports import InnerSource, InnerTarget, ParameterPort, Port
 
-__all__ = ["declared_box", "dissolve", "enclose"]
+__all__ = ["dissolve", "enclose"]
 
 Do: TypeAlias = Callable[[Change], None]
 End: TypeAlias = SourceEnd | TargetEnd
-
-
-# --- making ---
-
-
-def declared_box(kind: type[Box], ports: Mapping[Any, tuple[str, Any]], path: str) -> Box:
-    """Make an empty subgraph with ports of these names, kinds and types.
-
-    Raises:
-      GraphError: a port cannot be called or typed so.
-    """
-    for name in ports:
-        if not (isinstance(name, str) and name.isidentifier() and _is_free(name, kind)):
-            raise GraphError(f'subgraph "{path}": a port cannot be called {name!r}; choose another name')
-    try:
-        return _box_with(kind, {name: _declaration(kind, type_) for name, (kind, type_) in ports.items()})
-    except HfgError as error:
-        raise GraphError(f'subgraph "{path}": {error}') from error
-
-
-def _box_with(kind: type[Box], body: dict[str, Any]) -> Box:
-    box: Box = types.new_class(kind.__name__, (kind,), exec_body=lambda names: names.update(body))()
-    return box
-
-
-def _declaration(kind: str, type_: Any) -> Any:  # noqa: ANN401 - any type hint, and a port of any kind
-    """What stands in the body of the subgraph's class."""
-    match kind:
-        case "slot":
-            return slot(type=type_)
-        case "input":
-            return Input(type_)
-        case "event":
-            return Event(type_)
-    return Output(type_)
 
 
 # --- grouping ---
@@ -86,7 +52,8 @@ def enclose(do: Do, members: Sequence[Node], name: str) -> None:
     refuse_other_queues(around, outwards, crossing.__contains__, "grouping")
     kind = around.whole.box_type
     ports = _Names(crossing, inner, kind)
-    box = _box_with(kind, {port: _declaration(kind, type_) for port, kind, type_ in ports.of.values()})
+    body = {port: DECLARED[f"{kind}s"](type_) for port, kind, type_ in ports.of.values()}
+    box: Box = types.new_class(kind.__name__, (kind,), exec_body=lambda names: names.update(body))()
     halves = [(edge, around.connections.position(edge), _outer_half(edge, box, ports, inner)) for edge in edges]
     for edge in reversed(edges):
         do(EdgeChange.of(around, edge, added=False, for_good=False))
@@ -149,7 +116,7 @@ class _Names:
             end = edge.target if inwards else edge.source
             # of a vector each is a port of its own here, and so is the event beside an output
             plain = end.name.replace("[", "_").replace("]", "").replace(".", "_")
-            wanted = plain if _is_free(plain, box_type) else f"{plain}_port"
+            wanted = plain if is_free(plain, box_type) else f"{plain}_port"
             name, number = wanted, 1
             while name in taken:
                 number += 1
@@ -165,10 +132,6 @@ class _Names:
         """Give the bound port of an edge."""
         name, kind, _ = self.of[edge]
         return getattr(box.ports, f"{kind}s")[name]
-
-
-def _is_free(name: str, box_type: type[Box]) -> bool:
-    return not hasattr(box_type, name) and not name.startswith("_")
 
 
 def _outer_half(edge: Edge, box: Box, ports: _Names, inner: set[Node]) -> Edge | None:

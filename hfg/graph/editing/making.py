@@ -1,4 +1,4 @@
-"""Makes the nodes that commands name: by reference, with parameters as data (rule R4). Stands on the registry."""
+"""Makes nodes and values of plain data (rule R4). Depends on the registry and on encoding."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from hfg import registry
-from hfg.encoding import decode, has_tag
+from hfg.encoding import Find, decode, has_tag
 from hfg.errors import EncodingError, GraphError, HfgError
 from hfg.graph.editing.commands import Replace
 from hfg.nodetypes.node import Node
@@ -19,18 +19,18 @@ from hfg.types import accepts
 __all__ = ["as_meant", "fitting", "kept", "made"]
 
 
-def made(reference: str, parameters: dict[str, Any], path: str) -> Node:
+def made(reference: str, parameters: dict[str, Any], path: str, find: Find | None = None) -> Node:
     """Make a node of a type that is found by name.
 
     Raises:
-      GraphError: there is no such type, or a parameter is refused.
+      GraphError: the type does not exist, or a parameter is refused.
     """
     try:
         kind = registry.find(reference)
     except HfgError as error:
         raise GraphError(f'node "{path}": {error}') from error
     specs = kind._type.parameters
-    values = {name: fitting(specs[name], value) if name in specs else value for name, value in parameters.items()}
+    values = {name: fitting(specs[name], value, find) if name in specs else value for name, value in parameters.items()}
     try:
         node: Node = kind(**values)
     except (TypeError, ValueError) as error:
@@ -38,18 +38,20 @@ def made(reference: str, parameters: dict[str, Any], path: str) -> Node:
     return node
 
 
-def as_meant(value: object, hint: object) -> object:
-    """What came over a wire or from a file may stand for a value: a list for a tuple, a text for a path."""
-    return _meant(value, partial(decode, hint=hint), lambda one: accepts(one, hint))
+def as_meant(value: object, hint: object, find: Find | None = None) -> object:
+    """Return the value of a type that data represents: a tuple for a list, a path for a string.
+
+    Data that represents no such value is returned as it is, for the caller to refuse.
+    """
+    return _meant(value, partial(decode, hint=hint, find=find), lambda one: accepts(one, hint))
 
 
-def fitting(spec: ParameterSpec, value: object) -> object:
-    """The same for a value of a parameter, which may have limits."""
-    return _meant(value, spec.decode, lambda one: spec.check(one) is None)
+def fitting(spec: ParameterSpec, value: object, find: Find | None = None) -> object:
+    """Do the same for the value of a parameter, which may have limits."""
+    return _meant(value, partial(spec.decode, find=find), lambda one: spec.check(one) is None)
 
 
 def _meant(value: object, decoded: Callable[[object], object], fits: Callable[[object], bool]) -> object:
-    """A value as one of the type; what cannot be one is left as it is, for whoever checks it."""
     if not has_tag(value) and fits(value):
         return value
     try:
@@ -60,10 +62,10 @@ def _meant(value: object, decoded: Callable[[object], object], fits: Callable[[o
 
 
 def kept(old: Node, command: Replace) -> dict[str, Any]:
-    """The parameters of the new node: those that are given, and of the old one those that both have.
+    """Return the parameters of a new node: those that are given, and those that the old node has, too.
 
     Raises:
-      GraphError: there is no such type, or it does not take the value of one of them.
+      GraphError: the type does not exist, or refuses the value of one of them.
     """
     try:
         specs = registry.find(command.type)._type.parameters
@@ -85,7 +87,7 @@ def kept(old: Node, command: Replace) -> dict[str, Any]:
 
 
 def _as_now(spec: ParameterSpec, value: object) -> object:
-    """A value of a type that a reload has made anew, an enum or a dataclass, in that type."""
+    """Convert a value of a class that a reload has made anew, an enum or a dataclass, to the new class."""
     if spec.check(value) is None:
         return value
     try:

@@ -11,7 +11,7 @@ import functools
 import types
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Literal, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Final, Generic, Literal, TypeAlias, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -138,34 +138,38 @@ _UNITS: Final = {"_s": "s", "_hz": "Hz"}
 _WORDS: Final[Mapping[object, str]] = {bool: "True or False", int: "a whole number", float: "a number"}
 
 
-class Fields(msgspec.Struct):
-    """Base of structs whose fields are options."""
+G = TypeVar("G")
 
-    def said(self) -> dict[str, Any]:
-        """Return the options that have other values than their defaults, by name."""
-        return {
+
+class Fields(msgspec.Struct, Generic[G]):
+    """Base of structs whose fields are options; `G` is the TypedDict of what can be given in a call."""
+
+    def said(self) -> G:
+        """Return the options whose values differ from their defaults, by name."""
+        found = {
             name: value
             for name, one in declared(type(self)).items()
             if (value := getattr(self, name)) is not one.default and value != one.default
         }
+        return cast(G, found)
 
     def first_said(self, only: str) -> str | None:
         """Return the first option that has another value than its default, of those that only some may have.
 
         It is returned as written in a call.
         """
-        said, names = self.said(), having(type(self), only)
+        said, names = cast(Mapping[str, object], self.said()), having(type(self), only)
         return next((written(name, value) for name, value in said.items() if name in names), None)
 
 
-K = TypeVar("K", bound=Fields)
+K = TypeVar("K", bound=Fields[Any])
 
 
 @functools.cache
-def declared(kind: type[Fields]) -> Mapping[str, Declared]:
+def declared(kind: type[Fields[Any]]) -> Mapping[str, Declared]:
     """Return the options that a struct declares or inherits, by name, in order."""
     found: dict[str, Declared] = {}
-    bases = (base for base in kind.__bases__ if issubclass(base, Fields))
+    bases = (base for base in kind.__bases__ if issubclass(base, Fields) and base is not Fields)
     inherited = {name: one.option for base in bases for name, one in declared(base).items()}
     hints = get_type_hints(kind, include_extras=True)
     for field in msgspec.structs.fields(kind):
@@ -178,19 +182,19 @@ def declared(kind: type[Fields]) -> Mapping[str, Declared]:
 
 
 @functools.cache
-def having(kind: type[Fields], only: str) -> tuple[str, ...]:
+def having(kind: type[Fields[Any]], only: str) -> tuple[str, ...]:
     """Return the names of the options that only some may have, see `Option.only`."""
     return tuple(name for name, one in declared(kind).items() if one.option.only == only)
 
 
-def unknown(kind: type[Fields], names: Iterable[str], call: str) -> str | None:
+def unknown(kind: type[Fields[Any]], names: Iterable[str], call: str) -> str | None:
     """Say which of some names is not that of an option of a call; None if all are."""
     known = declared(kind)
     name = next((one for one in names if one not in known), None)
     return None if name is None else f'there is no option "{name}", options are those of {call}; {suggest(name, known)}'
 
 
-def refuse_values(kind: type[Fields], where: str, said: Mapping[str, Any], error: type[HfgError]) -> None:
+def refuse_values(kind: type[Fields[Any]], where: str, said: Mapping[str, Any], error: type[HfgError]) -> None:
     """Refuse values that options cannot have.
 
     Raises:
@@ -203,16 +207,16 @@ def refuse_values(kind: type[Fields], where: str, said: Mapping[str, Any], error
             raise error(f"{where}: {name} must be {one.expects}, got {value!r}{remedy}")
 
 
-def add_unset(kind: type[Fields], body: dict[str, Any], *, none: bool = False) -> None:
+def add_unset(kind: type[Fields[Any]], body: dict[str, Any], *, none: bool = False) -> None:
     """Add the options to the body of a struct of which some may be given; with `none`, None is given as nothing too."""
     for one in declared(kind).values():
         body["__annotations__"][one.name] = Union[(one.type, msgspec.UnsetType, *([None] if none else []))]
         body[one.name] = msgspec.UNSET
 
 
-def given(kind: type[Fields], struct: msgspec.Struct) -> dict[str, Any]:
+def given(kind: type[Fields[G]], struct: msgspec.Struct) -> G:
     """Return the options that such a struct gives, by name."""
-    return {name: value for name in declared(kind) if (value := getattr(struct, name)) is not msgspec.UNSET}
+    return cast(G, {name: value for name in declared(kind) if (value := getattr(struct, name)) is not msgspec.UNSET})
 
 
 def documented(kind: type[K]) -> type[K]:

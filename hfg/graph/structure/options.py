@@ -78,7 +78,7 @@ def _count(operators: Sequence[object]) -> str:
     return "1 operator" if len(operators) == 1 else f"{len(operators)} operators"
 
 
-class EdgeFields(Fields, kw_only=True):
+class EdgeFields(Fields[EdgeGiven[Any, Any]], kw_only=True):
     """How an edge transports."""
 
     active: Annotated[bool, Option("The edge also carries activity (a double line in drawings).", border="every")] = (
@@ -137,8 +137,8 @@ class EdgeFields(Fields, kw_only=True):
         ),
     ] = ()
 
-    def said(self) -> dict[str, Any]:
-        """Return the options that have other values than their defaults, by name."""
+    def said(self) -> EdgeGiven[Any, Any]:
+        """Return the options whose values differ from their defaults, by name."""
         found = super().said()
         if self.overflow == "latest":
             found.pop("capacity", None)  # it is 1 by that
@@ -181,7 +181,7 @@ def _each(names: Sequence[str]) -> str:
     return f"for each of {', '.join(names)}"
 
 
-class NodeFields(Fields, kw_only=True):
+class NodeFields(Fields[NodeGiven], kw_only=True):
     """How a node runs; nothing of it belongs to its type."""
 
     group: Annotated[
@@ -294,7 +294,7 @@ class GroupGiven(TypedDict, total=False):
     may_misalign: bool
 
 
-class GroupFields(Fields, kw_only=True):
+class GroupFields(Fields[GroupGiven], kw_only=True):
     """Where nodes run, and which of them comes first (rules R1, R2)."""
 
     threads: Annotated[

@@ -1,30 +1,30 @@
-"""What a graph file says, as plain data: structs of texts, numbers, lists and dicts; no node is made of it here.
+"""A graph as plain data: structs of strings, numbers, lists and dicts, without nodes.
 
     Document            a whole graph, or a subgraph that other files include
     ├── groups          GroupDocument by name
-    ├── nodes           NodeDocument by name; one may hold a BoxDocument of its own, its inside
-    │                   and a GateDocument, or InsideDocuments about what its type has built
-    └── edges           EdgeDocument in order, each perhaps with OperatorDocuments
+    ├── nodes           NodeDocument by name; may contain a BoxDocument, its inner graph, and a GateDocument, or
+    │                   InsideDocuments about the inner graph that its type has built
+    └── edges           EdgeDocument in order, with OperatorDocuments
 
-`reading` makes a document of a text and `writing` a text of a document; `building` makes a graph of a document and
-`describing` a document of a graph. Whoever reads another format makes a document and goes on from there. What is
-omitted in a file is what stands here as default, which is what `graph.add` and `graph.connect` take when it is not
-said. Stands on the options of the graph floor.
+`to_document` makes a document of a graph, `from_document` makes a graph of a document, and `to_commands` turns a
+document into commands. Graph files, commands, and graphs that are sent to other processes all go this way. Whatever
+reads another format makes a document and continues from there. The defaults here are those of `graph.add` and
+`graph.connect`. Depends on the options of `hfg.graph.structure`.
 """
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import msgspec
 
 from hfg.graph.editing.commands import EdgeSaid, Operator
 from hfg.graph.structure.option import declared
-from hfg.graph.structure.options import GroupFields, NodeFields
+from hfg.graph.structure.options import EdgeGiven, GroupFields, NodeFields
 
 __all__ = [
     "NODE_OPTIONS",
-    "SUFFIX",
+    "PORT_KINDS",
     "VERSION",
     "BoxDocument",
     "Document",
@@ -38,32 +38,36 @@ __all__ = [
 ]
 
 VERSION: Final = 1
-SUFFIX: Final = ".hfg.yaml"
+PORT_KINDS: Final = ("inputs", "outputs", "events", "slots")
 
 
 OperatorDocument = Operator
-"""An operator on an edge (rule P9); in a file its reference alone if it is given nothing."""
+"""An operator on an edge (rule P9); in a file only its reference if it has no arguments."""
 
 
 class EdgeDocument(EdgeSaid, omit_defaults=True):
-    """An edge; in a file "camera.out -> blur.image", what else is said about it below that.
+    """An edge; in a file "camera.out -> blur.image", with its options on the lines below.
 
     Attributes:
-      source: a port as seen from where the edge stands: "camera.out", "fetch/go_to.goal", or a port of its own by name.
+      source: a port as seen from the graph that contains the edge: "camera.out", "fetch/go_to.goal", or a port of the
+        graph itself by name.
       target: likewise.
     """
 
     source: str
     target: str
+    if TYPE_CHECKING:
+
+        def __init__(self, source: str, target: str, **options: Unpack[EdgeGiven[Any, Operator]]) -> None: ...
 
 
 class GateDocument(msgspec.Struct, omit_defaults=True):
     """While `by` is inactive the gated node rests (rule A11).
 
     Attributes:
-      by: the path of the state node or subgraph, from the graph in which the gated node stands, or behind a "/" from
-        the outermost graph of the file.
-      idle_rate_hz: so many firings a second go on meanwhile.
+      by: the path of the state node or subgraph, from the graph that contains the gated node, or after a "/" from the
+        outermost graph of the file.
+      idle_rate_hz: firings per second that are still allowed meanwhile.
     """
 
     by: str
@@ -80,7 +84,7 @@ class ParameterDocument(msgspec.Struct, omit_defaults=True):
     """A parameter that a subgraph declares.
 
     Attributes:
-      type: as a text, "float".
+      type: as a string, "float".
       default: its value unless the subgraph is made with another.
       unit: for people.
       choices: the only allowed values.
@@ -112,13 +116,13 @@ class ParameterDocument(msgspec.Struct, omit_defaults=True):
 
 
 class InsideDocument(msgspec.Struct, omit_defaults=True):
-    """What is otherwise with a node inside a subgraph than its type, or its file, makes it.
+    """How a node inside a subgraph differs from the one that the type, or the file, of the subgraph makes.
 
     Attributes:
       parameters: by name, those that were set.
-      enabled: whether it is at the start of a run.
+      enabled: whether it is enabled at the start of a run.
       group: where it runs; "" is the group of the subgraph around it.
-      gate: couples its work to the activity of another, whose path is as that of this one.
+      gate: couples its work to the activity of another, whose path is relative like that of this one.
       position: in a drawing, x and y.
       notes: of editors, by name.
     """
@@ -132,15 +136,15 @@ class InsideDocument(msgspec.Struct, omit_defaults=True):
 
 
 class BoxDocument(msgspec.Struct, omit_defaults=True):
-    """What lies in a graph, or inside a subgraph, and which ports that has.
+    """The contents of a graph, or of a subgraph, and its ports.
 
     Attributes:
-      inputs: the types of its ports by name, as texts: "int", "list[my_robot.types.Pose]"; so the next three.
+      inputs: the types of its ports by name, as strings: "int", "list[my_robot.types.Pose]"; so the next three.
       events: of subgraphs only, as are slots and parameters.
       parameters: that it is made with.
       nodes: by name, in order of adding.
       edges: in order of connecting.
-      promotes: by the name of a parameter, the parameters inside that it stands for (rule G3).
+      promotes: by the name of a parameter, the inner parameters that it sets (rule G3).
     """
 
     inputs: dict[str, str] = {}
@@ -154,20 +158,20 @@ class BoxDocument(msgspec.Struct, omit_defaults=True):
 
 
 class NodeDocument(NodeFields, omit_defaults=True):
-    """A node: what it is, how it runs, what it is given.
+    """A node: what it is, how it runs, and its parameters.
 
-    It is one of three: of a type, of a file, or a graph alone, which is a subgraph without a type of its own. A type
-    with a graph is a subgraph whose inside was edited and is told instead of built.
+    It has a type, or a file, or only a graph, which is a subgraph without a type of its own. A type with a graph is a
+    subgraph whose inner graph was edited: the graph replaces the one that the type builds.
 
     Attributes:
       type: its reference, "my_robot.nodes:MapLookup".
-      file: of a subgraph that another file describes, from the folder of this one.
+      file: of a subgraph that another file describes, relative to the folder of this one.
       gate: couples its work to the activity of another.
       parameters: by name.
-      inside: of a subgraph: what is otherwise with the nodes in it, by path from there.
+      inside: of a subgraph: how its inner nodes differ, by path from there.
       position: in a drawing, x and y.
       notes: of editors, by name.
-      graph: of a subgraph: its inside.
+      graph: of a subgraph: its inner graph.
     """
 
     type: str = ""

@@ -1,7 +1,7 @@
 """The JSON schema of graph files, made of the structs of `document`; editors complete and check by it.
 
 `graph.schema.json` beside this is what it gives, for who has no Python at hand. `typed` adds node types.
-Stands on `document`.
+Depends on `document`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Any, Final
 import docstring_parser
 import msgspec
 
-from hfg.files import document
-from hfg.files.document import VERSION, Document, EdgeDocument
+from hfg.graph.editing import document
 from hfg.graph.editing.commands import Operator
+from hfg.graph.editing.document import VERSION, Document, EdgeDocument
 from hfg.graph.structure.option import Fields, declared
 
 __all__ = ["json_schema", "schema_text"]

@@ -1,0 +1,222 @@
+"""Edits of a graph in terms of its own objects: each is checked as if it were made by hand, and recorded as changes.
+
+Commands (`performing`) and documents (`from_document`) both come here once their paths are resolved, so that there is
+one way to build a graph from data. Depends on `changes` and `structure`.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, Literal, TypeAlias, Unpack
+
+import msgspec
+
+from hfg.base.values import own_copy, same
+from hfg.encoding import Find
+from hfg.errors import GraphError
+from hfg.graph.editing.changes import (
+    Change,
+    EdgeChange,
+    EdgeSwap,
+    GateChange,
+    GroupsChange,
+    NodeChange,
+    NotesChange,
+    OptionsChange,
+    ParameterChange,
+    PortChange,
+    PromotionChange,
+    undo_all,
+)
+from hfg.graph.editing.data import edge_as_meant
+from hfg.graph.editing.making import as_meant, fitting
+from hfg.graph.editing.type_texts import type_of_text
+from hfg.graph.structure.adding import add
+from hfg.graph.structure.assigning import move
+from hfg.graph.structure.boundary import GraphInput, GraphOutput
+from hfg.graph.structure.connecting import declare_edge, refuse
+from hfg.graph.structure.declaring import need_new_port
+from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of
+from hfg.graph.structure.gates import Gate
+from hfg.graph.structure.gating import refuse_gate
+from hfg.graph.structure.given import edge_options, group_spec
+from hfg.graph.structure.level import Level, inside, level_of, nodes_within
+from hfg.graph.structure.options import EdgeGiven, GroupGiven, NodeGiven
+from hfg.graph.structure.places import side_of
+from hfg.graph.structure.promoting import refuse_promotion, stands_for
+from hfg.nodetypes.node import Node
+from hfg.ports import ParameterPort
+
+__all__ = ["Promoted", "Steps", "edges_of"]
+
+Promoted: TypeAlias = dict[str, list[ParameterPort[Any]]]
+
+
+class Steps:
+    """Edits one graph and records how.
+
+    Attributes:
+      root: the level from which paths start.
+      changes: all that was done, in order.
+      find: returns the code that values refer to; None allows only references that are tagged as such.
+    """
+
+    def __init__(self, root: Level, find: Find | None = None) -> None:
+        self.root = root
+        self.changes: list[Change] = []
+        self.find = find
+
+    def do(self, change: Change) -> None:
+        """Make a change that was checked, and record it."""
+        change.do()
+        self.changes.append(change)
+
+    def take_back(self, count: int = 0) -> None:
+        """Take back all changes after the first `count`."""
+        undo_all(self.changes[count:])
+        del self.changes[count:]
+
+    def gated_levels(self) -> list[Level]:
+        """Return the levels that have gates."""
+        return [level for level in self.root.walk() if level.gates.listed] if self.root.whole.gated else []
+
+    # --- nodes ---
+
+    def add(self, level: Level, name: str, node: Node, options: NodeGiven) -> None:
+        """Add a node that is in no graph yet."""
+        groups = self.root.whole.groups
+        before = groups.state()
+        add(level, node, name, options)
+        if groups.state() != before:  # by build() of a subgraph
+            self.changes.append(GroupsChange(groups, before, groups.state()))
+        position = len(level.nodes) - 1
+        self.changes.append(NodeChange(level, name, node, node._options, position, inside(node), added=True))
+
+    def remove(self, node: Node) -> None:
+        """Remove a node with its edges, gates, promotions and notes."""
+        around = level_of(node.place.graph)
+        gone = set(nodes_within(node))
+        for edge in edges_of(around, node):
+            self.disconnect(around, edge)
+        for level in self.gated_levels():
+            for gate in [gate for gate in level.gates if gate.target in gone or gate.by in gone]:
+                self.ungate(level, gate)
+        promoted = around.promotions.by_name.items()
+        self.set_promotions(around, {name: [one for one in ports if one.node is not node] for name, ports in promoted})
+        for one in gone:
+            self.set_notes(one, {})
+        self.do(NodeChange.of(node, added=False))
+
+    def set_options(self, node: Node, **options: Unpack[NodeGiven]) -> None:
+        """Change checked options of a node."""
+        before = node._options
+        self.do(OptionsChange(node, before, msgspec.structs.replace(before, **options)))
+
+    def move(self, node: Node, group: str | None) -> None:
+        """Let a node run in another group."""
+        before = node._options
+        move(self.root, node, group)
+        self.changes.append(OptionsChange(node, before, node._options))
+
+    def set_parameter(self, port: ParameterPort[Any], data: object) -> None:
+        """Set a parameter to a value that may be plain data."""
+        try:
+            value = fitting(port.spec, data, self.find)
+        except ValueError as error:
+            raise GraphError(str(error)) from error
+        self.write(port, value)
+
+    def write(self, port: ParameterPort[Any], value: object) -> None:
+        """Set a parameter, and the inner parameters that it stands for."""
+        before = [(one.node, one.name, one.value) for one in stands_for(port)]
+        try:
+            port.value = value
+        except ValueError as error:
+            raise GraphError(str(error)) from error
+        self.changes += [
+            ParameterChange(node, name, value, own_copy(node._parameters[name])) for node, name, value in before
+        ]
+
+    def set_notes(self, node: Node | None, after: dict[str, Any]) -> None:
+        """Replace the notes about a node, or about the whole graph."""
+        notes = self.root.whole.notes
+        before = notes.get(node, {})
+        if before != after:
+            self.do(NotesChange(notes, node, before, after))
+
+    # --- edges, gates, promotions ---
+
+    def connect(
+        self, level: Level, source: SourceEnd, target: TargetEnd, said: EdgeGiven[Any, Any], where: str
+    ) -> Edge:
+        """Add an edge whose options are data; errors about operators start with `where`."""
+        options = edge_as_meant(said, target, where, partial(as_meant, find=self.find))
+        edge = declare_edge(level, source, target, options)
+        self.changes.append(EdgeChange(level, edge, len(level.edges) - 1, added=True))
+        return edge
+
+    def disconnect(self, level: Level, edge: Edge) -> None:
+        """Remove an edge, with the tokens on it."""
+        self.do(EdgeChange.of(level, edge, added=False))
+
+    def redeclare(self, level: Level, edge: Edge, said: EdgeGiven[Any, Any]) -> None:
+        """Change options of an edge. Options that stay the same are no change, which a run could not follow."""
+        where = f'"{edge.label}"'
+        options = edge_as_meant(said, edge.target, where, partial(as_meant, find=self.find))
+        checked = edge_options(lambda: where, msgspec.structs.asdict(edge.options) | options)
+        refuse(level, edge.source, edge.target, checked)
+        if not same(checked, edge.options):
+            self.do(EdgeSwap(level, edge, Edge(edge.source, edge.target, checked)))
+
+    def gate(self, gate: Gate, level: Level | None = None) -> None:
+        """Set a gate at a level; by default at the outermost one around both nodes that no iteration separates."""
+        refuse_gate(self.root, gate)
+        side, other = (side_of(level_of(node.place.graph)) for node in (gate.target, gate.by))
+        if side is not other:
+            raise GraphError(
+                f'"{gate.target.place.path}" and "{gate.by.place.path}" are on different sides of the boundary of a '
+                "subgraph that iterates, which no gate crosses (rule G4); gate nodes on the same side"
+            )
+        level = level or side
+        self.do(GateChange(level, gate, len(level.gates.listed), added=True))
+
+    def ungate(self, level: Level, gate: Gate) -> None:
+        """Remove a gate."""
+        self.do(GateChange(level, gate, level.gates.listed.index(gate), added=False))
+
+    def promote(self, outer: ParameterPort[Any], inner: ParameterPort[Any]) -> None:
+        """Let a parameter of a subgraph stand for an inner one, which takes its value."""
+        around = level_of(inner.node.place.graph)
+        refuse_promotion(around, outer, inner)
+        self.write(inner, outer.value)
+        promoted = around.promotions.copied()
+        self.set_promotions(around, promoted | {outer.name: [*promoted.get(outer.name, []), inner]})
+
+    def set_promotions(self, level: Level, promoted: Promoted) -> None:
+        """Let other parameters stand for the inner ones, if that changes anything."""
+        before = level.promotions.copied()
+        after = {name: ports for name, ports in promoted.items() if ports}
+        if before != after:
+            self.do(PromotionChange(level, before, after))
+
+    # --- the whole graph ---
+
+    def declare_group(self, name: str, said: GroupGiven) -> None:
+        """Declare a group, or declare it with other options."""
+        groups = self.root.whole.groups
+        before = groups.state()
+        groups.change(group_spec(name, said))
+        self.changes.append(GroupsChange(groups, before, groups.state()))
+
+    def declare_port(self, kind: Literal["input", "output"], name: str, type_: str) -> None:
+        """Declare a port of the whole graph; its type is a string."""
+        hint = type_of_text(type_, f'{kind} "{name}" of the graph')
+        need_new_port(self.root, kind, name, hint)
+        made = GraphInput if kind == "input" else GraphOutput
+        port: GraphInput[Any] | GraphOutput[Any] = made(self.root.face, name, hint)
+        self.do(PortChange(self.root, port, added=True))
+
+
+def edges_of(level: Level, node: Node) -> list[Edge]:
+    """Return the edges that begin or end at a port of a node, as seen from outside, in order."""
+    return [edge for edge in level.connections.at(node) if node in (owner_of(edge.source), owner_of(edge.target))]
