@@ -16,7 +16,7 @@ from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
 from hfg.engine import PunctualLoop
 from hfg.errors import TargetError
-from hfg.files.document import SUFFIX
+from hfg.files.opening import SUFFIX
 from hfg.graph import Graph
 
 __all__ = ["studio"]

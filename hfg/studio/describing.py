@@ -207,12 +207,12 @@ def _edge(edge: Edge, level: str) -> EdgeRecord:
 
 def _edge_options(edge: Edge) -> dict[str, Any]:
     try:
-        said = edge_as_data(edge, encode)
+        said = dict(edge_as_data(edge, encode))
     except GraphError:  # operators without a name, values that are not data
-        said = edge.options.said()
+        said = dict(edge.options.said())
         for name in ("initial", "through"):
             if name in said:
-                said[name] = [shown(one, _MOST_LETTERS) for one in said[name]]
+                said[name] = [shown(one, _MOST_LETTERS) for one in getattr(edge.options, name)]
     said.pop("active", None)
     return said
 

@@ -18,7 +18,7 @@ from hfg.base.logs import Log
 from hfg.base.whole import GrowingFile
 from hfg.errors import HfgError
 from hfg.files import describe, text_of
-from hfg.files.document import SUFFIX
+from hfg.files.opening import SUFFIX
 from hfg.graph import Graph
 from hfg.graph.editing import Transaction, history_of
 from hfg.graph.editing.commands import Command, decode, encode

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from hfg.files import describe, load, save, text_of
-from hfg.files.document import SUFFIX
+from hfg.files.opening import SUFFIX
 from hfg.graph import Graph
 from hfg.graph.editing import Transaction, history_of
 from hfg.studio.journal import Journal
