@@ -47,20 +47,24 @@ class Steering:
       run: the current run; None at rest.
     """
 
-    def __init__(self, graph: Graph, follower: Follower, *, run: Run | None = None, target: str | bool = False) -> None:
+    def __init__(self, graph: Graph, follower: Follower, target: str | bool = False) -> None:
         self.graph = graph
         self.run: Run | None = None
         self._follower = follower
         self._target = target
-        self._own = run is None
-        self._record = RunRecord(steerable=run is None)
+        self._own = True
+        self._record = RunRecord()
         self._breakpoints: dict[str, tuple[Condition | None, Breakpoint | None]] = {}
         self._task: asyncio.Task[None] | None = None
         self._until_stopped: asyncio.Event | None = None
         self._listener: Any = None
         self._over = asyncio.Event()
-        if run is not None:
-            self._begun(run)
+
+    def follow(self, run: Run) -> None:
+        """Follow a run that another program has begun, and that cannot be started here."""
+        self._own = False
+        self._record = msgspec.structs.replace(self._record, steerable=False)
+        self._begun(run)
 
     # --- from rest to rest ---
 

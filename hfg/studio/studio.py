@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import os
 import time
 from collections.abc import Callable, Coroutine
@@ -13,6 +14,7 @@ from importlib.metadata import version
 from typing import Any, Final
 
 from hfg.base.logs import Log
+from hfg.engine import Run
 from hfg.errors import HfgError
 from hfg.studio.describing import automatic_ports
 from hfg.studio.following import Following
@@ -45,6 +47,11 @@ _MOST_VIEWERS: Final = 32
 _MOST_LEVELS: Final = 64
 
 
+@functools.cache
+def _version() -> str:
+    return version("hfg")
+
+
 class Studio(Following):
     """One graph that pages see and edit.
 
@@ -53,13 +60,17 @@ class Studio(Following):
       read_only: why nothing can be changed; "" if it can.
     """
 
-    def __init__(self, project: Project, *, read_only: str = "", run: Any = None, target: str | bool = False) -> None:
-        super().__init__(project, Steering(project.graph, self, run=run, target=target))
+    def __init__(
+        self, project: Project, *, read_only: str = "", run: Run | None = None, target: str | bool = False
+    ) -> None:
+        super().__init__(project, Steering(project.graph, self, target))
         self.boot = os.urandom(8).hex()
         self.read_only = read_only
         self._count = 0
         self._beating: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
+        if run is not None:
+            self.steering.follow(run)
 
     # --- pages ---
 
@@ -77,7 +88,7 @@ class Studio(Following):
                 boot=self.boot,
                 viewer=viewer.number,
                 name=self.graph.name,
-                version=version("hfg"),
+                version=_version(),
                 read_only=self.read_only,
                 automatic=automatic_ports(),
                 topics=list(TOPICS),
