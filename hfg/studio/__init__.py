@@ -1,7 +1,7 @@
 """The studio: a graph, at rest or running, that several pages in a browser see and edit at once.
 
     messages     what a page and the studio say to each other      records     what a page shows, as tables of records
-    describing   a graph as records         tables     what has changed, as numbered patches
+    describing, places   a graph as records, and its paths     tables   what has changed, as numbered patches
     following    keeps the tables as the graph and its run are     history, words   edits as people read them
     targets      where an edge may lead, and why not               palette     node types that words and a wire fit
     viewing      one page: its frames, its subscriptions, its credits
@@ -11,6 +11,7 @@
     layouts      where everything is drawn  clipboard  nodes as text
     project      the file: open, save, who else has written it     journal     edits that survive a sudden end
     requests, asking   what a page asks for                        refusing    a refusal as fields
+    running_elsewhere  runs of other programs
     studio       all of it together
     entrance     who may come in            web        the pages' server    serving  its thread and port
 

@@ -14,7 +14,9 @@ from hfg.graph.structure.pointing import node_at
 from hfg.studio.clipboard import pasted, text_of_nodes
 from hfg.studio.following import Following
 from hfg.studio.palette import search_types, type_of_reference
+from hfg.studio.places import place_at
 from hfg.studio.refusing import Refused
+from hfg.studio.running_elsewhere import runs_of_this_user
 from hfg.studio.showing import shown_value
 from hfg.studio.targets import targets
 from hfg.studio.topics import node_measures
@@ -97,7 +99,7 @@ async def _value(host: Following, args: _Path) -> Any:
     run = host.steering.run
     if run is None:
         raise Refused("state", "the graph does not run, so nothing passes there")
-    with run.tap(args.path, size=1) as tap:
+    with run.tap(place_at(host.graph, args.path), size=1) as tap:
         try:
             async with asyncio.timeout(_PATIENCE_S):
                 token = await anext(tap)
@@ -115,6 +117,12 @@ async def _node(host: Following, args: _Path) -> Any:
 
 async def _folder(host: Following, args: _Path) -> Any:
     return host.project.listing(args.path)
+
+
+async def _start(host: Following, args: _Nothing) -> Any:
+    listed = host.project.listing("")
+    runs = await asyncio.to_thread(runs_of_this_user)
+    return {"folder": host.project.folder.name, "files": listed["files"], "runs": runs}
 
 
 async def _difference(host: Following, args: _Nothing) -> Any:
@@ -145,6 +153,7 @@ _ANSWERS: Final[Mapping[str, tuple[type[_Args], Callable[[Following, Any], Await
     "value": (_Path, _value),
     "node": (_Path, _node),
     "folder": (_Path, _folder),
+    "start": (_Nothing, _start),
     "difference": (_Nothing, _difference),
     "text": (_Paths, _text),
     "paste": (_Paste, _paste),

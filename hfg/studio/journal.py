@@ -59,7 +59,7 @@ class Journal:
         name = "graph" if file is None else file.name
         self.path = (folder if file is None else file.parent) / f".{name}.hfg-journal"
         self._base = base
-        self._file: GrowingFile | None = None
+        self._begun = False
         self._done = self._undone = 0  # steps that a new studio could undo and redo as well
         self._broken = False
         self.offer = self._found()
@@ -122,16 +122,20 @@ class Journal:
         if self._broken:
             return
         try:
-            if self._file is None:
+            if not self._begun:
                 with suppress(FileNotFoundError):
                     self.path.unlink()
-                self._file = GrowingFile(self.path, append=True, at_once=True)
-                self._file.write(msgspec.json.encode(_Line(base=self._base)) + b"\n")
-                self.offer = None
-            self._file.write(msgspec.json.encode(line) + b"\n")
+                self._append(_Line(base=self._base))
+                self._begun, self.offer = True, None
+            self._append(line)
         except OSError as error:
             self._broken = True
             _LOGGER.warning("unsaved edits are not kept in %s: %s", self.path, error.strerror)
+
+    def _append(self, line: _Line) -> None:
+        file = GrowingFile(self.path, append=True, at_once=True)
+        file.write(msgspec.json.encode(line) + b"\n")
+        file.complete()
 
     # --- afterwards ---
 
@@ -170,15 +174,11 @@ class Journal:
 
     def drop(self) -> None:
         """Its edits are saved or given up: remove it."""
-        self.close(keep=False)
         self.offer = None
+        self.close(keep=False)
 
     def close(self, *, keep: bool) -> None:
         """Write no more."""
-        if self._file is not None:
-            with suppress(OSError):
-                self._file.complete()
-            self._file = None
         if not keep and self.offer is None:
             with suppress(OSError):
                 self.path.unlink()

@@ -123,14 +123,19 @@ class Project:
         return found
 
     def open(self, path: str, *, discard: bool) -> None:
-        """Take another file's graph.
+        """Take another file's graph; without a path an empty one.
 
         Raises:
           Refused: there are unsaved edits, or it is outside of the folder.
           FileError: it holds no graph.
         """
         self._need_saved(discard)
+        if not path:
+            self._take(Graph("graph"), None)
+            return
         file = self.within(path)
+        if not file.is_file():
+            raise Refused("file", f'there is no file "{path}" in the folder "{self.folder.name}"')
         self._take(self._read(file), file)
 
     def reread(self) -> None:
@@ -143,7 +148,7 @@ class Project:
         if self.changes and not discard:
             raise Refused("changed", f"{_count(self.changes)} would be lost; save first, or discard them")
 
-    def _take(self, graph: Graph, file: Path) -> None:
+    def _take(self, graph: Graph, file: Path | None) -> None:
         self.journal.drop()
         self.graph, self.file = graph, file
         self._now_saved()

@@ -22,6 +22,7 @@ from hfg.graph.editing.commands import Command
 from hfg.studio.conditions import condition_text, holds
 from hfg.studio.failing import error_record
 from hfg.studio.messages import Condition
+from hfg.studio.places import place_at
 from hfg.studio.records import BreakpointRecord, RunRecord
 from hfg.studio.refusing import Refused
 from hfg.trace import RunEnded, RunPaused, RunResumed, TraceEvent
@@ -224,8 +225,7 @@ class Steering:
         """Pause whenever the run comes there, now and in the runs to come."""
         self.unbreak(path)
         if self.run is None:
-            if " -> " not in path:
-                _ = self.graph[path]  # a path that leads nowhere is refused at once
+            place_at(self.graph, path)  # a path that leads nowhere is refused at once
             self._breakpoints[path] = condition, None
         else:
             self._breakpoints[path] = condition, self._set_breakpoint(self.run, path, condition)
@@ -233,7 +233,7 @@ class Steering:
 
     def _set_breakpoint(self, run: Run, path: str, condition: Condition | None) -> Breakpoint:
         when = None if condition is None else lambda token: holds(condition, token.value)
-        return run.break_at(path, when=when)
+        return run.break_at(place_at(self.graph, path), when=when)
 
     def unbreak(self, path: str) -> None:
         """Pause there no more."""

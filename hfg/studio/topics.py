@@ -16,10 +16,13 @@ import numpy as np
 from hfg.engine import Run
 from hfg.engine.observing.sampling import BARS, Sample, Sampler
 from hfg.engine.observing.taps import Tap
+from hfg.errors import GraphError
+from hfg.graph import Edge
 from hfg.reporting.pictures import is_picture
 from hfg.studio.conditions import part_of
 from hfg.studio.following import Following
 from hfg.studio.logs import LogKeeper
+from hfg.studio.places import place_at
 from hfg.studio.refusing import Refused
 from hfg.studio.showing import image_frame, number_in, shown_value
 from hfg.trace import ActivityChanged, TraceEvent
@@ -199,23 +202,36 @@ class _Flows(_Sampled):
 
     def __init__(self, host: Following, edges: list[str]) -> None:
         super().__init__(host)
-        self._edges = edges
+        self._keys = edges
+        self._edges: list[Edge | None] = []
+        self._rev = -1
         self._before: dict[str, tuple[float, int]] = {}
 
     def news(self) -> Any:
         if self.sampler is None:
             return None
+        if self._rev != self.host.tables.rev:  # they may be others
+            self._rev = self.host.tables.rev
+            self._edges = [self._found(key) for key in self._keys]
         self.sampler.settle()
-        return b"".join(self._one(edge, self.sampler) for edge in self._edges)
+        pairs = zip(self._keys, self._edges, strict=True)
+        return b"".join(self._one(key, edge, self.sampler) for key, edge in pairs)
 
-    def _one(self, edge: str, sampler: Sampler) -> bytes:
-        flow = sampler.flow(edge)
+    def _found(self, key: str) -> Edge | None:
+        try:
+            found = place_at(self.host.graph, key)
+        except GraphError:
+            return None
+        return found if isinstance(found, Edge) else None
+
+    def _one(self, key: str, edge: Edge | None, sampler: Sampler) -> bytes:
+        flow = None if edge is None else sampler.flow(edge)
         if flow is None:
             return bytes(_FLOW.size)
         now = self.time()
-        at, sent = self._before.get(edge, (now, flow.sent))
-        if now - at >= 1.0 or edge not in self._before:
-            self._before[edge] = now, flow.sent
+        at, sent = self._before.get(key, (now, flow.sent))
+        if now - at >= 1.0 or key not in self._before:
+            self._before[key] = now, flow.sent
         rate = (flow.sent - sent) / (now - at) if now > at else 0.0
         return _FLOW.pack(flow.sent & 0xFFFFFFFF, flow.untaken, rate)
 
@@ -295,7 +311,7 @@ class _Tapped(_Topic):
             self.attach(self.run)  # a path that leads nowhere is refused at once
 
     def attach(self, run: Run) -> None:
-        self.tap = run.tap(self._path, size=self.size)
+        self.tap = run.tap(place_at(self.host.graph, self._path), size=self.size)
         self._seen = 0
 
     def let_go(self) -> None:

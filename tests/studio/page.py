@@ -32,7 +32,7 @@ def tables_of(graph: hfg.Graph) -> Any:
 
 
 class Page:
-    """One page.
+    """One page, which paints every frame at once.
 
     Attributes:
       tables: its replica.
@@ -64,6 +64,7 @@ class Page:
         if frame.is_binary:
             _, _, sub, seq, _ = HEADER.unpack_from(data)
             self.binary.append((sub, seq, data[HEADER.size :]))
+            self._paint(sub, seq)
         else:
             self._take(json.loads(data))
         self._changed.set()
@@ -92,6 +93,12 @@ class Page:
                 self._answers.pop(message["id"]).set_result(message)
             case _:
                 self.frames.append(message)
+                if message["t"] == "data":
+                    self._paint(message["sub"], message["seq"])
+
+    def _paint(self, sub: int, seq: int) -> None:
+        if (subscription := self.viewer.subscriptions.get(sub)) is not None:
+            subscription.painted(seq)
 
     # --- what it does ---
 

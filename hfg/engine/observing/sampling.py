@@ -13,7 +13,7 @@ from hfg.engine.model.running_node import RunningNode
 from hfg.engine.observing.measuring import Measuring, doing
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.places import edges_at, place_of
-from hfg.errors import GraphError, UsageError
+from hfg.graph import Edge
 
 __all__ = ["BARS", "Box", "Flow", "Sample", "Sampler"]
 
@@ -97,12 +97,9 @@ class Sampler:
         self._engine.core.settle_counts()
         self._engine.core.settle_barriers()
 
-    def flow(self, edge: str) -> Flow | None:
+    def flow(self, edge: Edge) -> Flow | None:
         """Return how much has passed an edge as it is drawn; None if there is none in this process."""
-        try:
-            edges = edges_at(self._engine, place_of(self._engine, edge))
-        except (GraphError, UsageError):
-            return None
+        edges = edges_at(self._engine, place_of(self._engine, edge))
         if not edges:
             return None
         return Flow(sum(one.sent for one in edges), sum(one.untaken for one in edges))

@@ -1,0 +1,374 @@
+"""Streams: nothing is made without a subscriber or without credit, and what is shown is what the engine did."""
+
+from __future__ import annotations
+
+import logging
+import struct
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hfg
+from hfg.base.token import Token
+from hfg.studio.showing import image_frame, shown_value
+from hfg.studio.viewing import Subscription
+from tests.studio.page import Page, live, studio_of
+from tests.studio.test_studio import doubling, ticking
+
+
+class Lamp(hfg.Node):
+    """Is active from `on` to `off`."""
+
+    done = hfg.Event()
+
+    @hfg.slot
+    def on(self) -> None: ...
+
+    @hfg.slot
+    def off(self) -> None:
+        self.done.trigger()
+
+
+def lamps() -> hfg.Graph:
+    """Two lamps, of which one hands its activity to the other."""
+    graph = hfg.Graph("lamps")
+    one, other = graph.add(Lamp(), name="one"), graph.add(Lamp(), name="other")
+    one.done.activates(other.on)
+    return graph
+
+
+class Counting:
+    """A topic that counts how often it is asked."""
+
+    credit = 2
+    kind = 0
+
+    def __init__(self) -> None:
+        self.taken = 0
+        self.closed = False
+
+    def take(self) -> Any:
+        self.taken += 1
+        return {"n": self.taken}
+
+    def time(self) -> float:
+        return 1.5
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def test_a_frame_needs_credit_which_comes_back_when_it_is_painted() -> None:
+    topic = Counting()
+    stream = Subscription(1, topic, 10.0)
+    assert stream.frame(0.0)
+    assert stream.frame(1.0)
+    assert stream.frame(2.0) is None
+    assert topic.taken == 2  # nothing is made for a page that paints nothing
+    stream.painted(1)
+    assert stream.frame(3.0)
+    assert stream.frame(4.0) is None
+    stream.painted(10_000)  # of frames that were never sent
+    assert stream.frame(5.0)
+    assert stream.frame(6.0)
+    assert stream.frame(7.0) is None
+
+
+def test_frames_keep_to_their_rate() -> None:
+    topic = Counting()
+    stream = Subscription(1, topic, 10.0)
+    times = []
+    for step in range(60):
+        now = 100 + step / 60
+        if stream.frame(now):
+            times.append(now)
+            stream.painted(topic.taken)
+    assert len(times) in (10, 11)
+
+
+def beat(page: Page, times: int = 1) -> None:
+    """Let the studio send what is due."""
+    for stream in page.viewer.subscriptions.values():
+        stream.due = 0.0
+    for _ in range(times):
+        page.viewer.beat(1e9)
+
+
+def values(page: Page, sub: int) -> list[Any]:
+    return [frame["value"] for frame in page.frames if frame["t"] == "data" and frame["sub"] == sub]
+
+
+@pytest.mark.rule("A5")
+def test_activity_says_who_is_active_and_by_which_edge_it_came() -> None:
+    async def main() -> None:
+        page = Page(studio_of(lamps())).join()
+        await page.ask("start", stay=True)
+        page.say(t="sub", sub=1, topic="activity")
+        await page.ask("trigger", path="one.on", activity=1)
+        run = page.studio.steering.run
+        assert run is not None
+        await run.wait_quiet()
+        beat(page)
+        assert list(values(page, 1)[-1]["active"]) == ["one"]
+        await page.ask("trigger", path="one.off")
+        await run.wait_quiet()
+        beat(page)
+        seen = values(page, 1)
+        assert list(seen[-1]["active"]) == ["other"]
+        assert [(path, on, via) for one in seen for _, path, on, _, via in one["moves"]] == [
+            ("one", True, []),
+            ("one", False, []),
+            ("other", True, ["one.done -> other.on"]),
+        ]
+        await page.studio.close()
+
+    live(main)
+
+
+def test_nothing_is_sent_while_nobody_can_see_the_page() -> None:
+    async def main() -> None:
+        page = Page(studio_of(lamps())).join()
+        await page.ask("start", stay=True)
+        page.say(t="sub", sub=1, topic="activity")
+        page.say(t="visible", on=False)
+        await page.ask("trigger", path="one.on", activity=1)
+        beat(page, 5)
+        before = len(values(page, 1))
+        page.say(t="visible", on=True)
+        beat(page)
+        assert len(values(page, 1)) == before + 1
+        await page.studio.close()
+
+    live(main)
+
+
+def test_a_value_is_shown_with_how_often_it_passes() -> None:
+    async def main() -> None:
+        page = Page(studio_of(ticking())).join()
+        await page.ask("start", stay=True)
+        page.say(t="sub", sub=2, topic="value", args={"path": "clock.out"})
+        beat(page)
+        assert values(page, 2) == []
+        for value in (3, 4):
+            await page.ask("trigger", path="clock.tick", value=value)
+        assert page.studio.steering.run is not None
+        await page.studio.steering.run.wait_quiet()
+        beat(page)
+        (shown,) = values(page, 2)
+        assert (shown["kind"], shown["data"], shown["seen"]) == ("number", 4, 2)
+        await page.studio.close()
+
+    live(main)
+
+
+def test_numbers_for_a_plot_come_each_once() -> None:
+    async def main() -> None:
+        page = Page(studio_of(ticking())).join()
+        await page.ask("start", stay=True)
+        page.say(t="sub", sub=3, topic="history", args={"path": "clock.out"})
+        run = page.studio.steering.run
+        assert run is not None
+        for number in range(3):
+            await page.ask("trigger", path="clock.tick", value=number)
+            await run.wait_quiet()
+            beat(page)
+        assert [one["values"] for one in values(page, 3)] == [[0.0], [1.0], [2.0]]
+        assert [one["fresh"] for one in values(page, 3)] == [True, False, False]
+        await page.studio.close()
+
+    live(main)
+
+
+def test_measures_are_packed_in_the_order_of_the_nodes() -> None:
+    async def main() -> None:
+        page = Page(studio_of(ticking())).join()
+        await page.ask("start", stay=True)
+        page.say(t="sub", sub=4, topic="measures", args={"nodes": ["count", "nobody", "clock"]})
+        beat(page)
+        for _ in range(3):
+            await page.ask("trigger", path="clock.tick", value=1)
+        assert page.studio.steering.run is not None
+        await page.studio.steering.run.wait_quiet()
+        beat(page)
+        sub, _, data = page.binary[-1]
+        records = list(struct.iter_unpack("<BBHIfffff24f", data))
+        assert (sub, len(records)) == (4, 3)
+        count, nobody, clock = records
+        assert (count[3], clock[3]) == (3, 3)
+        assert count[1] == 3  # bars
+        assert all(seconds > 0 for seconds in count[9:12])
+        assert not any(nobody)
+        await page.studio.close()
+
+    live(main)
+
+
+def test_the_flow_of_an_edge_is_counted_even_across_a_border() -> None:
+    async def main() -> None:
+        graph = ticking()
+        graph.edit(hfg.commands.Enclose(("count",), "box"))
+        page = Page(studio_of(graph)).join()
+        await page.ask("start", stay=True)
+        edges = list(page.tables["edges"])
+        assert len(edges) == 2
+        page.say(t="sub", sub=5, topic="flow", args={"edges": edges})
+        await page.ask("trigger", path="clock.tick", value=1)
+        assert page.studio.steering.run is not None
+        await page.studio.steering.run.wait_quiet()
+        beat(page)
+        assert [one[:2] for one in struct.iter_unpack("<IIf", page.binary[-1][2])] == [(1, 0), (1, 0)]
+        await page.studio.close()
+
+    live(main)
+
+
+def test_the_timeline_has_a_box_for_each_firing() -> None:
+    async def main() -> None:
+        page = Page(studio_of(ticking())).join()
+        await page.ask("start", stay=True)
+        page.say(t="sub", sub=6, topic="timeline")
+        beat(page)
+        for _ in range(2):
+            await page.ask("trigger", path="clock.tick", value=1)
+        assert page.studio.steering.run is not None
+        await page.studio.steering.run.wait_quiet()
+        beat(page)
+        boxes = [box for one in values(page, 6) for box in one["boxes"]]
+        assert sorted(box[0] for box in boxes) == ["clock", "clock", "count", "count"]
+        assert all(box[1] == "loop" and 0 <= box[2] <= box[3] for box in boxes)
+        assert sum(one["lost"] for one in values(page, 6)) == 0
+        await page.studio.close()
+
+    live(main)
+
+
+def test_log_records_come_with_the_path_of_their_node() -> None:
+    async def main() -> None:
+        page = Page(studio_of(doubling())).join()
+        page.say(t="sub", sub=7, topic="log")
+        logging.getLogger("hfg.node.scaled").warning("it is %s", "late", extra={"path": "scaled"})
+        beat(page)
+        ((_, level, path, text),) = values(page, 7)[0]["records"]
+        assert (level, path, text) == ("warning", "scaled", "it is late")
+        page.say(t="unsub", sub=7)
+        assert not [one for one in logging.getLogger("hfg").handlers if type(one).__name__ == "LogKeeper"]
+
+    live(main)
+
+
+def test_a_subscription_lives_on_in_the_next_run() -> None:
+    async def main() -> None:
+        page = Page(studio_of(ticking())).join()
+        page.say(t="sub", sub=1, topic="value", args={"path": "clock.out"})
+        for value in (1, 2):
+            await page.ask("start", stay=True)
+            beat(page)
+            await page.ask("trigger", path="clock.tick", value=value)
+            assert page.studio.steering.run is not None
+            await page.studio.steering.run.wait_quiet()
+            beat(page)
+            await page.ask("stop")
+            await page.state("ended")
+        assert [one["data"] for one in values(page, 1)] == [1, 2]
+
+    live(main)
+
+
+@pytest.mark.parametrize(
+    ("topic", "args", "says"),
+    [
+        ("value", {"path": "nobody.out"}, 'no node "nobody"'),
+        ("value", {}, "path"),
+        ("value", {"path": "clock.out", "more": 1}, "more"),
+        ("gossip", {}, "a page subscribes to one of"),
+    ],
+)
+def test_what_cannot_be_subscribed_to_is_said_in_words(topic: str, args: dict[str, Any], says: str) -> None:
+    async def main() -> None:
+        page = Page(studio_of(ticking())).join()
+        await page.ask("start", stay=True)
+        page.say(t="sub", sub=9, topic=topic, args=args)
+        (gone,) = page.frames
+        assert gone["t"] == "gone"
+        assert says in gone["message"]
+        assert not page.viewer.subscriptions
+        await page.studio.close()
+
+    live(main)
+
+
+def test_a_page_has_a_bounded_number_of_subscriptions_and_requests() -> None:
+    async def main() -> None:
+        page = Page(studio_of(ticking())).join()
+        for sub in range(1, 400):
+            page.say(t="sub", sub=sub, topic="activity")
+        assert len(page.viewer.subscriptions) == 256
+        page.cut()
+        assert not page.studio.listeners
+
+    live(main)
+
+
+def test_the_engine_does_nothing_for_pages_without_subscriptions() -> None:
+    async def main() -> None:
+        page = Page(studio_of(ticking())).join()
+        await page.ask("start", stay=True)
+        run = page.studio.steering.run
+        assert run is not None
+        core = run._engine.core
+        assert core.trace is None  # only changes are traced
+        assert all(worker.meter is None for worker in core.workers)
+        assert page.studio._beating is None
+        await page.studio.close()
+
+    live(main)
+
+
+# --- values ---
+
+
+@pytest.mark.parametrize(
+    ("value", "kind"),
+    [
+        (3, "number"),
+        (np.float32(2.5), "number"),
+        (True, "number"),
+        ("text", "text"),
+        (None, "none"),
+        ([1, 2], "list"),
+        ({"a": 1}, "record"),
+        ([{"a": 1}], "table"),
+        (np.zeros((9, 9), np.uint8), "image"),
+        (np.zeros((3, 3)), "array"),
+        (object(), "other"),
+        (hfg.END, "marker"),
+    ],
+)
+def test_every_value_is_shown(value: object, kind: str) -> None:
+    shown = shown_value(Token(value, stamp=1.0))
+    assert shown["kind"] == kind
+    assert isinstance(shown["summary"], str)
+
+
+class Hostile:
+    def __repr__(self) -> str:
+        raise RuntimeError("no")
+
+    def __len__(self) -> int:
+        raise RuntimeError("no")
+
+
+def test_values_that_cannot_be_shown_say_so() -> None:
+    assert "Hostile" in shown_value(Token(Hostile()))["summary"]
+    five = shown_value(Token(np.zeros((480, 640, 5), np.uint8)))
+    assert five["message"] == "This picture cannot be shown: it has 5 channels. Its shape is 480 x 640 x 5."
+    assert shown_value(Token("x" * 100_000))["data"] is None
+
+
+@pytest.mark.parametrize("shape", [(480, 640), (480, 640, 3), (480, 640, 4), (480, 640, 1)])
+def test_images_are_made_small_enough_for_the_page(shape: tuple[int, ...]) -> None:
+    frame = image_frame(np.full(shape, 200, np.uint8), 160, 75)
+    assert struct.unpack_from("<HH", frame) == (640, 480)
+    assert frame[4:6] in (b"\xff\xd8", b"\x89P")
+    assert len(frame) < 20_000
