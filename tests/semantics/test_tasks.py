@@ -529,6 +529,78 @@ def test_one_that_triggers_without_end_waits_for_room() -> None:
     assert report.edges["node.told -> slow.hear"].grown == 0
 
 
+class Slow(hfg.Node):
+    @hfg.slot
+    async def hear(self, value: object) -> None:
+        await asyncio.sleep(1)
+
+
+async def never_ends(node: Starter) -> None:
+    number = 0
+    while True:
+        number += 1
+        await node.told.trigger_wait(number)
+
+
+@pytest.mark.rule("F8", "X3")
+@pytest.mark.parametrize("where", ["setup", "process"])
+def test_one_that_waits_for_room_again_and_again_ends_with_the_run(where: str) -> None:
+    graph, node, _ = starting(never_ends, where)
+    graph.connect(node.told, graph.add(Slow()).hear, capacity=2)
+    assert run(graph, until_s=10).outcome == "until"
+    assert node.story[-1][1] == "teardown"
+
+
+@pytest.mark.rule("F8", "X3")
+def test_a_firing_that_waits_for_room_again_and_again_ends_with_the_run() -> None:
+    class Floods(hfg.Node):
+        value = hfg.Input(int)
+        told = hfg.Event(object)
+
+        async def process(self, value: int) -> None:
+            while True:
+                await self.told.trigger_wait(value)
+
+    graph = hfg.Graph()
+    node = graph.add(Floods())
+    graph.connect(graph.add(script(values=(1,))).out, node.value)
+    graph.connect(node.told, graph.add(Slow()).hear, capacity=2)
+    assert run(graph, until_s=3).outcome == "until"
+
+
+@pytest.mark.rule("A10", "F8")
+def test_one_waits_for_room_before_the_start_too() -> None:
+    seen: list[int] = []
+
+    class Slow(hfg.Node):
+        async def setup(self) -> None:
+            await asyncio.sleep(1)
+            seen.append(waiting.said)
+
+        @hfg.slot
+        def hear(self, value: object) -> None:
+            """Nothing more."""
+
+    class Waiting(hfg.Node):
+        told = hfg.Event(int)
+        said = hfg.State(0)
+
+        def setup(self) -> None:
+            self.start_soon(self.tell())
+
+        async def tell(self) -> None:
+            for number in range(100):
+                self.said = number
+                await self.told.trigger_wait(number)
+
+    graph = hfg.Graph()
+    waiting = graph.add(Waiting())
+    graph.connect(waiting.told, graph.add(Slow()).hear, capacity=4)
+    report = run(graph)
+    assert seen == [3]
+    assert report.edges["waiting.told -> slow.hear"].grown == 0
+
+
 class Speaks(hfg.Node):
     """Says its last word behind one for which it waits, amid its firing."""
 

@@ -67,6 +67,22 @@ def random_edit(graph: Graph, choose: Chooser, number: int) -> list[c.Command]:
     commands = [random_command(graph, choose, f"e{number}")]
     if choose.chance(15):
         commands.append(random_command(graph, choose, f"f{number}"))
+    if choose.chance(10):
+        commands += _talker(graph, choose, f"t{number}")
+    return commands
+
+
+def _talker(graph: Graph, choose: Chooser, name: str) -> list[c.Command]:
+    """Return the commands that add a node whose task speaks from `setup()` on, while this edit may still wait."""
+    parameters = {
+        "period_s": choose.one_of((0.0, 0.001, 0.002, 0.005)),
+        "count": choose.number(1, 5),
+        "greets": choose.chance(30),
+    }
+    commands: list[c.Command] = [c.Add("tests.support.kinds:Watch", name, parameters, {})]
+    slots = [port.path for node in graph.nodes.values() for port in node.ports.slots.values()]
+    if slots and choose.chance(70):
+        commands.append(c.Connect(f"{name}.tick", choose.one_of(slots), active=choose.chance(20)))
     return commands
 
 

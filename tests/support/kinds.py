@@ -919,9 +919,12 @@ class Watch(hfg.Node):
     tick = hfg.Event(int)
     period_s = hfg.Parameter(0.02)
     count = hfg.Parameter(6)
+    greets = hfg.Parameter(False)
 
     def setup(self) -> None:
         """Start; the start of the task is invisible, so the parameters are read here, before any edit."""
+        if self.greets:
+            self.tick.trigger(-1)
         self.start_soon(self.ticks(self.count, self.period_s))
 
     async def ticks(self, count: int, period_s: float) -> None:

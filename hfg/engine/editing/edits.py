@@ -70,6 +70,7 @@ class _Following:
       values: parameters with which nobody works yet.
       copied: of each copy that it makes what it is a copy of, and what the parameters of that were then.
       come: new nodes, of which the setup has begun.
+      fresh: nodes that are enabled by it, whose second setup has begun.
       took_effect: from here on nothing is taken back.
     """
 
@@ -80,6 +81,7 @@ class _Following:
         self.values: list[ParameterChange] = []
         self.copied: list[tuple[NodeCopied, dict[str, Any]]] = []
         self.come: list[RunningNode] = []
+        self.fresh: list[RunningNode] = []
         self.took_effect = False
 
 
@@ -190,6 +192,7 @@ class Edits:
         except BaseException:
             if not edit.took_effect:
                 undo_all([change for change in changes if change not in edit.values])
+                _stay_disabled(edit.fresh)
                 self.lock.wait_for(edit.come)
                 await self._to_its_end(self._tear_down(edit.come))
             raise
@@ -225,6 +228,8 @@ class Edits:
         for worker in fresh:
             self.lock.wait_for((worker,))
             await self._hook(worker, node_lifecycle.tear_down)
+            worker.lifecycle.wait_to_take_part()
+            edit.fresh.append(worker)
             await self._hook(worker, node_lifecycle.set_up)
         return fresh
 
@@ -263,6 +268,7 @@ class Edits:
             self._lifecycle.carry(worker)
             worker.be_busy("setup")
             self.lock.wait_for((worker,))
+            worker.lifecycle.wait_to_take_part()
             await self._hook(worker, node_lifecycle.set_up)
             self._lifecycle.came(worker)
 
@@ -324,6 +330,7 @@ class Edits:
             except HfgError as error:
                 self._engine.finish("failed", error)
             else:
+                node_lifecycle.take_part(worker)
                 doing.afresh(worker)
 
     async def _become(self, worker: RunningNode, node: Any) -> None:
@@ -343,6 +350,7 @@ class Edits:
         worker.take_node(node)
         worker.show_activity()
         self._lifecycle.carry(worker)
+        worker.lifecycle.wait_to_take_part()
         await self._hook(worker, node_lifecycle.set_up)
 
     def _take_effect(self, edit: _Following) -> None:
@@ -359,6 +367,8 @@ class Edits:
         for edge in how.lost:
             self._lifecycle.forget(edge)
         self._tell_parameters(edit.changes)
+        for worker in (*edit.come, *(worker for worker, _, _ in how.swapped)):
+            node_lifecycle.take_part(worker)
         swapped = {change.old: change.new for change in edit.changes if isinstance(change, NodeSwap)}
         edited = Edited([worker for worker, _, _ in how.swapped], swapped, nodes)
         for find_again in engine.callbacks.edited:
@@ -459,6 +469,13 @@ def _take_values(edit: _Following) -> None:
             copy = change.copy
             if (copy, name) not in said and value is not before[name] and same(copy._parameters[name], before[name]):
                 write_parameter(copy, name, value)
+
+
+def _stay_disabled(fresh: Iterable[RunningNode]) -> None:
+    """Nodes that were set up to be enabled, and are not: what they send goes nowhere, and their tasks end (F10)."""
+    for worker in fresh:
+        node_lifecycle.take_part(worker)
+        node_lifecycle.end_tasks((worker,))
 
 
 def _refuse_for_good(change: Change) -> None:

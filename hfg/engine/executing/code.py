@@ -369,9 +369,16 @@ class CodeRunner:
         task.add_done_callback(self.aside.discard)
 
     async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
-        """Trigger, then wait until no `wait` queue behind the node's events is full (F8)."""
+        """Trigger, then wait until no `wait` queue behind the node's events is full (F8).
+
+        Before the start tasks wait too, but not `setup()`, because the start waits for it. After the end of the run,
+        code that sends in an endless loop yields here each time; otherwise it would block the loop, uncancellable.
+        """
         worker = event.worker
         core = worker.core
+        if worker.lifecycle.early is not None:
+            await self._early(event, value, activity, stamp)
+            return
         task = current_task.get()
         own: Any = worker.room.wait if whose_code() is worker else _nobody_waits  # its own waits for us
         if task is not None and task.worker is worker:
@@ -379,8 +386,23 @@ class CodeRunner:
             own = worker.need_tasks().wait_for_room
         else:
             trigger(event, value, activity, stamp)
-        while worker.room.full_edges and core.started and not core.over:
+        while worker.room.full_edges and (core.started or task is not None) and not core.over:
             await self._room(worker, own)
+        if core.over:
+            await asyncio.sleep(0)
+
+    async def _early(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
+        """Wait until a node that is set up ahead takes part; otherwise an endless loop would block this one (R4).
+
+        `setup()` does not wait, because the node takes part after it.
+        """
+        lifecycle = event.worker.lifecycle
+        assert event.port is not None
+        event.port._emit(value, activity, stamp)
+        if not lifecycle.opening:
+            waiter: asyncio.Future[None] = self.loop.create_future()
+            lifecycle.when_taking_part(lambda: answer(waiter, None))
+            await waiter
 
     async def _room(self, worker: RunningNode, own: Callable[[int], None]) -> None:
         """Wait until there is room behind all events of a worker; `own` counts who of it waits."""

@@ -210,6 +210,8 @@ class Lifecycle(Record):
     is_up: bool = False  # its setup has started, its teardown has not
     opening: bool = False  # its setup is in progress
     backoff_timer: Timer | None = None  # the pause of a restart (X1)
+    early: list[Callable[[], None]] | None = None  # its signals before it takes part (R4, F10); None once it does
+    waiters: list[Callable[[], None]] = field(default_factory=list)  # its code that waits until it takes part
 
     def open(self) -> None:
         """Its setup starts; a teardown follows even if it fails."""
@@ -223,6 +225,20 @@ class Lifecycle(Record):
         """Its teardown starts."""
         assert self.is_up, "a node is torn down that was not set up"
         self.is_up = False
+
+    def wait_to_take_part(self) -> None:
+        """It is set up ahead: its signals are kept until it takes part, because its events have no edges yet."""
+        self.early = []
+
+    def when_taking_part(self, waiter: Callable[[], None]) -> None:
+        """Call back when its signals leave at once."""
+        self.waiters.append(waiter)
+
+    def take_part(self) -> list[Callable[[], None]]:
+        """From here on its signals leave at once; return the calls that have waited until now, in order."""
+        kept = [*(self.early or ()), *self.waiters]
+        self.early, self.waiters = None, []
+        return kept
 
     def rest(self, timer: Timer) -> None:
         """It is set up again when this timer is over (X1)."""

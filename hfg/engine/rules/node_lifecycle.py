@@ -32,6 +32,7 @@ __all__ = [
     "reset",
     "restart",
     "set_up",
+    "take_part",
     "tear_down",
     "when_idle",
 ]
@@ -102,6 +103,24 @@ def set_up(worker: RunningNode, then: Then) -> None:
         then(error)
 
     _run_hook(worker, "setup", opened)
+
+
+def take_part(worker: RunningNode) -> None:
+    """Let a node that was set up ahead take part: its signals since then leave now instead of being lost (R4, F10).
+
+    A signal that an edge refuses (P5) is an error of `setup()`.
+    """
+    if worker.lifecycle.early is None:
+        return
+    kept = worker.lifecycle.take_part()
+    worker.core.rules.bind_ports(worker)
+    try:
+        for send in kept:
+            send()
+    except Exception as error:
+        problem = NodeError(worker.path, "setup()", error)
+        problem.__cause__ = error
+        worker.core.runtime.finish("failed", problem)
 
 
 def tear_down(worker: RunningNode, then: Then) -> None:
@@ -231,6 +250,7 @@ def enable(worker: RunningNode, then: Callable[[], None], *, fresh: bool = False
 
     def up() -> None:
         if not worker.own_enabled or not all(scope.enabled for scope in worker.around):
+            take_part(worker)  # over edges that are dead
             then()  # disabled again meanwhile
             return
         worker.allow(DISABLED | ENDED)
@@ -238,6 +258,7 @@ def enable(worker: RunningNode, then: Callable[[], None], *, fresh: bool = False
         if itself and core.trace_changes is not None:  # else the subgraph around it was, and that is told
             core.trace_changes(NodeEnabled(core.now(), worker.path, True))
         wiring.refresh(worker)
+        take_part(worker)
         consider(worker)
         find_dead_sources(core)
         doing.afresh(worker)
@@ -246,11 +267,17 @@ def enable(worker: RunningNode, then: Callable[[], None], *, fresh: bool = False
     if fresh:
         up()
     else:
-        _afresh(worker, up)
+        _afresh(worker, up, ahead=True)
 
 
-def _afresh(worker: RunningNode, then: Callable[[], None]) -> None:
-    """Teardown of what is set up, then setup; a failure ends the run. A restart under way does it in its time (X1)."""
+def _afresh(worker: RunningNode, then: Callable[[], None], *, ahead: bool = False) -> None:
+    """Teardown of what is set up, then setup; a failure ends the run. A restart in progress does it later (X1).
+
+    Args:
+      worker: of the node.
+      then: what follows.
+      ahead: it takes part when that follows, and not before.
+    """
     host = worker.core.runtime
 
     def down(error: NodeError | None) -> None:
@@ -259,6 +286,8 @@ def _afresh(worker: RunningNode, then: Callable[[], None]) -> None:
         elif error is not None:
             host.finish("failed", error)
         else:
+            if ahead:
+                worker.lifecycle.wait_to_take_part()
             set_up(worker, up)
 
     def up(error: NodeError | None) -> None:

@@ -101,6 +101,9 @@ def bind_event(worker: RunningNode, name: str) -> RunningEvent:
         port._emit = task_ports.triggering(event, port._emit)
     if worker.core.debug:
         port._emit, port._emit_wait = _checked(worker, port, port._emit), _checked(worker, port, port._emit_wait)
+    if worker.lifecycle.early is not None:
+        port.__dict__.pop("trigger", None)
+        port._emit = partial(_keep, event)
     host.adopt_event(port)
     if is_automatic_event(name) and worker.scope is not None:
         plan.watch_scope(worker.scope)
@@ -109,6 +112,16 @@ def bind_event(worker: RunningNode, name: str) -> RunningEvent:
         worker.changed()
         bind(worker)  # what it triggers may have consequences now
     return event
+
+
+def _keep(event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
+    """R4: what a node sends that is set up ahead leaves when it takes part, with the time at which it was sent (T5)."""
+    worker = event.worker
+    early = worker.lifecycle.early
+    assert early is not None, "a node that takes part keeps what it sends"
+    if stamp is None and type(value) is not Token:
+        stamp = worker.core.now()
+    early.append(lambda: event.port._emit(value, activity, stamp))
 
 
 def _checked(

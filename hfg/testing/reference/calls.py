@@ -237,7 +237,9 @@ class Calling(Tending):
                 station.opening = True
                 self.run_hook(station, hook)
                 station.opening = False
-            if not self.is_enabled(station.leaf.index):  # they last as long as its setup (F10)
+            if station.early is None and not self.is_enabled(
+                station.leaf.index
+            ):  # they last as long as its setup (F10)
                 self.cancel_tasks(station)
             station.is_to_do = station.active
             self.begin_to_do(station)

@@ -16,6 +16,7 @@ from hfg.graph.editing.commands import read
 from hfg.testing.reference.calls import Calling
 from hfg.testing.reference.state import Line, Station, fresh
 from hfg.testing.reference.structure import ROOT, Edge, End, Structure, boundary_of, is_box, whole
+from hfg.testing.reference.waiting import MOMENT_S
 from hfg.trace import ParameterSet, TokenDropped, TokenProcessed
 
 __all__ = ["Editing"]
@@ -33,6 +34,8 @@ class Editing(Calling):
     def hold(self, paths: Iterable[str]) -> None:
         """An edit waits: these nodes start nothing until it is done."""
         self.held = {id(self.stations[self.paths[path]]) for path in paths}
+        if self.edit_began is None:
+            self.edit_began = self.now
 
     def is_held(self, index: int) -> bool:
         """Return whether an edit waits for the node, or for others with it."""
@@ -44,6 +47,7 @@ class Editing(Calling):
         self._note_missed_timeouts()
         if what:
             self._follow(self._draw(what))
+        self.edit_began = None
         self.settle()
 
     def _note_missed_timeouts(self) -> None:
@@ -108,6 +112,8 @@ class Editing(Calling):
         self._silence_those_that_rest_now(enabled)
         for station in self.stations:
             self._process_what_is_pipelined_now(station)
+        for station in self.stations:
+            self._take_part(station)
 
     def _swap(self, changes: Sequence[Change], before: dict[int, Station]) -> set[int]:
         """Find stations by the nodes that have taken the places of others; give those that this is about."""
@@ -136,7 +142,7 @@ class Editing(Calling):
         for station in self.stations:
             if id(station) not in were:
                 self.connect_one(station)
-                self.set_up(station)
+                self._set_up_ahead(station)
             elif id(station) in swapped:
                 self._exchange_node(station)
         for line in new:
@@ -147,6 +153,31 @@ class Editing(Calling):
         for station in before:
             if id(station) not in here:
                 self._remove(station)
+
+    def _set_up_ahead(self, station: Station) -> None:
+        """A new node was set up when the edit began, and its tasks have continued since."""
+        now, self.now = self.now, self.now if self.edit_began is None else self.edit_began
+        station.early = []
+        self.set_up(station)
+        while True:
+            while self.now < now and (tasks := self.tasks_in_turn(station)):
+                self.go_on_with(tasks[0])
+            due = min(
+                (time for task in station.tasks if (time := self.loop.next_time_of(task)) is not None), default=now
+            )
+            if due >= now - MOMENT_S:
+                break
+            self.now = due
+            self.loop.ring()
+        self.now = now
+        if not self.is_enabled(station.leaf.index):  # they last as long as that (F10)
+            self.cancel_tasks(station)
+
+    def _take_part(self, station: Station) -> None:
+        """Its signals since it was set up leave at the moment of the edit."""
+        early, station.early = station.early or (), None
+        for name, value, activity, stamp in early:
+            self.trigger(station.leaf.index, name, value, activity, stamp)
 
     def _silence_those_that_rest_now(self, enabled: Sequence[Station]) -> None:
         here = {id(station) for station in self.stations}

@@ -149,6 +149,9 @@ class Sending(State):
         value, activity, stamp = passed_on(value, activity, stamp)
         if stamp is None:
             stamp = self.now if flight is None else flight.stamp
+        if owner >= 0 and (early := self.stations[owner].early) is not None:
+            early.append((name, value, activity, stamp))
+            return
         lines = self.lines_from(owner, "event", name)
         for line in lines:
             if (

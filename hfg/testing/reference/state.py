@@ -158,6 +158,7 @@ class Station:
     stamp: float = 0.0  # of the firing in which it ended
     set_up: bool = False
     opening: bool = False  # its `setup()` runs
+    early: list[tuple[str, Any, int | None, float]] | None = None  # what it sends before it takes part (R4)
     tasks: list[Task] = field(default_factory=list)  # under way beside its firings
     tasks_begun: int = 0
     is_to_do: bool = False  # its do-activity has yet to begin (A15)
@@ -257,6 +258,7 @@ class State:
         self.lost_activity = 0
         self.returning: list[tuple[Line, int]] = []  # activity that got nowhere, and its sender (F13, A8)
         self.held: set[int] = set()  # stations that an edit waits for (R4), by identity
+        self.edit_began: float | None = None  # when one that waits has set up the nodes that come
         for station in self.stations:
             station.enabled = bool(station.leaf.options.enabled)
 
