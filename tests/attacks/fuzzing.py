@@ -7,6 +7,7 @@ and writes kind and number of each into that file beforehand: who kills the proc
 from __future__ import annotations
 
 import base64
+import io
 import itertools
 import json
 import os
@@ -16,6 +17,7 @@ import struct
 import sys
 import tempfile
 import time
+import zipfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
@@ -144,6 +146,19 @@ def _archives() -> list[bytes]:
         place = Path(folder) / "a.npz"
         np.savez_compressed(place, a=np.zeros(100), b=np.arange(3))
         return [place.read_bytes()]
+
+
+def _packed() -> list[bytes]:
+    """Archives that other programs have packed; their damage is reported by other errors than zlib's."""
+    with tempfile.TemporaryDirectory() as folder:
+        place, found = Path(folder) / "a.npz", []
+        array = io.BytesIO()
+        np.save(array, np.arange(100.0))
+        for method in (zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA, zipfile.ZIP_STORED):
+            with zipfile.ZipFile(place, "w", method) as archive:
+                archive.writestr("a.npy", array.getvalue())
+            found.append(place.read_bytes())
+        return found
 
 
 _PICTURES: Final = (".png", ".jpg", ".bmp", ".tiff", ".webp", ".gif", ".jp2", ".ppm", ".pam", ".ras", ".avif")
@@ -316,6 +331,7 @@ KINDS: Final[dict[str, Kind]] = {
     "table": Kind(lambda: [b'a,b,c\n1,2,x\n"q",,\n'], _TABLE, lambda path: read_csv.function(path)),
     "array": Kind(_array_files, _BINARY, lambda path: read_array.function(path)),
     "archive": Kind(_archives, _BINARY, lambda path: read_arrays.function(path)),
+    "packed": Kind(_packed, _BINARY, lambda path: read_arrays.function(path)),
     "header": Kind(_pictures, _BINARY, _read_header),
     "picture": Kind(_pictures, _BINARY, _read_picture, native=True),
     "video": Kind(_videos, _BINARY, _read_video, native=True),

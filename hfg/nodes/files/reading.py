@@ -221,9 +221,20 @@ def load_array(path: Path, mode: Literal["r"] | None = None) -> Any:
             need_fair_arrays(path, is_zip=is_zip, whole=mode is None)
             return np.load(path, mmap_mode=mode, allow_pickle=False)
         except Exception as error:  # what numpy and zipfile raise, whatever is in a file: a dozen kinds
-            if isinstance(error, OSError) and error.errno != errno.EINVAL:  # of a place before the file
+            if _is_of_the_system(error):
                 raise
-            raise ValueError(f'"{path}" is not a numpy file without Python objects: {error}') from None
+            raise ValueError(
+                f'"{path}" is not a numpy file without Python objects: {error}; write it again with numpy.save or '
+                "numpy.savez"
+            ) from None
+
+
+def _is_of_the_system(error: Exception) -> bool:
+    """Return whether the system could not read a file, and not that its content makes no sense.
+
+    For damaged content bz2 raises an OSError without a number, and the system refuses positions before the file.
+    """
+    return isinstance(error, OSError) and error.errno not in (None, errno.EINVAL)
 
 
 @node
@@ -266,10 +277,10 @@ def read_arrays(path: FilePath) -> dict[str, Array]:
     with found, reaching(place, "read"):
         try:
             return {name: found[name] for name in found.files}
-        except OSError:
-            raise
         except Exception as error:  # see `load_array`
-            raise ValueError(f'"{path}" cannot be read: {error}') from None
+            if _is_of_the_system(error):
+                raise
+            raise ValueError(f'"{path}" cannot be read: {error}; write it again with numpy.savez') from None
 
 
 def load_image(path: FilePath, mode: Literal["color", "gray", "raw"]) -> Any:
