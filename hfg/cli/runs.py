@@ -12,7 +12,7 @@ import uuid
 from collections.abc import AsyncIterator, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, TypeVar
 
 import msgspec
 import typer
@@ -23,30 +23,9 @@ from hfg.cli.options import AllowOption, ArgOption, ParamOption, SettingsOption,
 from hfg.engine.face.watching import Answer, Question
 from hfg.engine.observing.encoding import encode
 from hfg.errors import HfgError, NoAnswer, QueryRefused, TargetError, TransportError
-from hfg.parts.hosts.realm import (
-    FINDS_S,
-    AgentIs,
-    Chunk,
-    Deploy,
-    Done,
-    End,
-    Gone,
-    Look,
-    PartIs,
-    Parts,
-    PartsAre,
-    ReadLog,
-    Realm,
-    Restart,
-    RunIs,
-    Seen,
-    Started,
-    Stop,
-    Wait,
-    agent_place,
-    ask,
-    run_place,
-)
+from hfg.parts.hosts import requests
+from hfg.parts.hosts.realm import FINDS_S, AgentIs, Realm, RunIs, agent_place, run_place
+from hfg.parts.hosts.requests import Request, ask
 from hfg.parts.transports import open_session
 
 __all__ = ["RealmLine", "deploy", "logs", "ps", "restart", "stop"]
@@ -58,6 +37,7 @@ _ENDS_S: Final = 15.0
 _PATIENCE_S: Final = 2.0  # for one look
 _FIRST_INCARNATION: Final = 1
 
+Answered = TypeVar("Answered")
 RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="name of the run, its first characters, or the name of its graph")
 ]
@@ -87,9 +67,9 @@ class RealmLine:
         Raises:
           TargetError: the run is over.
         """
-        look, place = Look(encode(question)), run_place(self._run.run)
+        look, place = requests.Look(encode(question)), run_place(self._run.run)
         try:
-            told = self._runner.run(ask(self._realm.session, place, look, Seen, timeout_s=_PATIENCE_S))
+            told = self._runner.run(ask(self._realm.session, place, look, timeout_s=_PATIENCE_S))
         except NoAnswer:
             if place in self._realm.runs:
                 return None
@@ -199,11 +179,11 @@ def _find(realm: Realm, name: str | None) -> RunIs:
     )
 
 
-async def _parts(realm: Realm, run: RunIs) -> list[PartIs]:
+async def _parts(realm: Realm, run: RunIs) -> list[requests.PartIs]:
     try:
-        return (await ask(realm.session, run_place(run.run), Parts(), PartsAre)).parts
+        return (await ask(realm.session, run_place(run.run), requests.Parts())).parts
     except TransportError:
-        return [PartIs("", run.host, run.process, "does not answer", 0, 0.0)]
+        return [requests.PartIs("", run.host, run.process, "does not answer", 0, 0.0)]
 
 
 async def _ps(settings: str | None, json: bool) -> int:
@@ -233,7 +213,7 @@ def _plain(one: Any) -> dict[str, Any]:
     return {name: getattr(one, name) for name in one.__struct_fields__}
 
 
-def _time(part: PartIs) -> str:
+def _time(part: requests.PartIs) -> str:
     minutes, seconds = divmod(int(part.up_s), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{seconds:02}"
@@ -249,8 +229,8 @@ async def _deploy(settings: str | None, target: str, on: str | None, arguments: 
         agent = await realm.agent(host)
         run = uuid.uuid4().hex[:12]
         folder = str(Path.cwd()) if host == here else ""
-        order = Deploy(f"hfg/{run}", target, list(arguments), folder)
-        await _ask_agent(realm, agent, order, Started)
+        order = requests.Deploy(f"hfg/{run}", target, list(arguments), folder)
+        await _ask_agent(realm, agent, order)
         gone = asyncio.ensure_future(_gone(realm, agent, order.run))
         begun = asyncio.ensure_future(realm.until(lambda: run_place(run) in realm.runs, _BEGINS_S))
         await asyncio.wait({gone, begun}, return_when=asyncio.FIRST_COMPLETED)
@@ -258,7 +238,7 @@ async def _deploy(settings: str | None, target: str, on: str | None, arguments: 
         if run_place(run) not in realm.runs:
             has_failed = gone.result() if gone.done() else True  # else it is slow beyond all patience
             gone.cancel()
-            told = await _ask_agent(realm, agent, ReadLog(order.run, 0), Chunk)
+            told = await _ask_agent(realm, agent, requests.ReadLog(order.run, 0))
             show.write(told.text, to_stderr=True)
             if not has_failed:
                 return 0  # it was over before anybody could look
@@ -278,7 +258,7 @@ async def _gone(realm: Realm, agent: AgentIs, run: str) -> bool:
     """
     while True:
         try:
-            told = await _ask_agent(realm, agent, Wait(run, "", _FIRST_INCARNATION), Gone, timeout_s=20.0)
+            told = await _ask_agent(realm, agent, requests.Wait(run, "", _FIRST_INCARNATION), timeout_s=20.0)
         except NoAnswer:
             if agent_place(agent) not in realm.agents:
                 raise TransportError(f'the agent of host "{agent.host}" is gone, and the run with it') from None
@@ -288,9 +268,9 @@ async def _gone(realm: Realm, agent: AgentIs, run: str) -> bool:
         await asyncio.sleep(_LOOKS_AGAIN_S)
 
 
-async def _ask_agent(realm: Realm, agent: AgentIs, request: Any, answer: Any, *, timeout_s: float = 10.0) -> Any:
+async def _ask_agent(realm: Realm, agent: AgentIs, request: Request[Answered], *, timeout_s: float = 10.0) -> Answered:
     try:
-        return await ask(realm.session, agent_place(agent), request, answer, timeout_s=timeout_s)
+        return await ask(realm.session, agent_place(agent), request, timeout_s=timeout_s)
     except QueryRefused as error:
         raise TransportError(f'the agent of host "{agent.host}" refuses: {error}') from None
 
@@ -330,7 +310,7 @@ async def _read_all(realm: Realm, place: str, agent: AgentIs, run: str, offsets:
     lines: list[str] = []
     while True:
         try:
-            told: Chunk = await ask(realm.session, place, ReadLog(run, offsets.get(place, 0)), Chunk)
+            told = await ask(realm.session, place, requests.ReadLog(run, offsets.get(place, 0)))
         except TransportError:
             return lines
         offsets[place] = told.offset
@@ -344,14 +324,19 @@ async def _stop(settings: str | None, name: str) -> int:
         run = _find(realm, name)
         place = run_place(run.run)
         try:
-            await ask(realm.session, place, Stop(), Done)
+            await ask(realm.session, place, requests.Stop())
             if await realm.until(lambda: place not in realm.runs, _ENDS_S):
                 return 0
         except NoAnswer:
             _need_permission(run, await _parts(realm, run))
         for agent in realm.of(run.host):  # its main part does not answer: whoever has begun it ends it
             with contextlib.suppress(HfgError):
-                await _ask_agent(realm, agent, End(f"hfg/{run.run}", "", _FIRST_INCARNATION), Done, timeout_s=_ENDS_S)
+                await _ask_agent(
+                    realm,
+                    agent,
+                    requests.End(f"hfg/{run.run}", "", _FIRST_INCARNATION),
+                    timeout_s=_ENDS_S,
+                )
         if await realm.until(lambda: place not in realm.runs, FINDS_S):
             show.sentence(f"run {run.run} did not answer; its process was ended")
             return 1
@@ -361,7 +346,7 @@ async def _stop(settings: str | None, name: str) -> int:
         return 1
 
 
-def _need_permission(run: RunIs, parts: list[PartIs]) -> None:
+def _need_permission(run: RunIs, parts: list[requests.PartIs]) -> None:
     """Who may not steer gets no answer: nobody tells him, but that what only tells is answered.
 
     Raises:
@@ -378,7 +363,7 @@ async def _restart(settings: str | None, name: str, group: str) -> int:
     async with _realm(settings) as realm:
         run = _find(realm, name)
         try:
-            await ask(realm.session, run_place(run.run), Restart(group), Done, timeout_s=_ENDS_S)
+            await ask(realm.session, run_place(run.run), requests.Restart(group), timeout_s=_ENDS_S)
         except NoAnswer:
             _need_permission(run, await _parts(realm, run))
             raise

@@ -14,22 +14,23 @@ import os
 import sys
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import msgspec
 
 from hfg.base.logs import Log
 from hfg.engine import Run
 from hfg.engine.face.composition import Composition
-from hfg.engine.observing.report import EdgeReport, Report
+from hfg.engine.observing.report import Report
 from hfg.errors import HfgError, RunError, UsageError
 from hfg.graph import Graph
-from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatGraph, cut
+from hfg.graph.flat import MAIN, Cutting, FlatGraph, cut
+from hfg.parts.hosts import requests
 from hfg.parts.hosts.announcement import Announcement
-from hfg.parts.hosts.realm import PartIs
+from hfg.parts.model import messages
 from hfg.parts.model.agreement import Agreement, Question, Rest
 from hfg.parts.model.clocks import RunClock, machine
 from hfg.parts.model.components import components
@@ -38,30 +39,7 @@ from hfg.parts.model.deaths import LIMIT, WITHIN_S
 from hfg.parts.model.failing import as_error
 from hfg.parts.model.inheriting import inherited, keeping, remembered
 from hfg.parts.model.ledgers import Entry, Ledger, ledger_of
-from hfg.parts.model.messages import (
-    Ask,
-    AskTime,
-    Call,
-    Close,
-    Closed,
-    Ended,
-    Failed,
-    Finish,
-    Keep,
-    Kept,
-    Logged,
-    Message,
-    OfAnEdge,
-    Open,
-    Opened,
-    Reborn,
-    Rests,
-    Result,
-    Seen,
-    TellTime,
-    Told,
-    Untrue,
-)
+from hfg.parts.model.messages import Message, OfAnEdge, Untrue
 from hfg.parts.model.trace_filter import trace_filter
 from hfg.parts.processes.peer_process import Launcher, PeerProcess
 from hfg.parts.processes.worker import FIRST_INCARNATION
@@ -71,11 +49,10 @@ from hfg.parts.running.part_links import PartLinks
 from hfg.parts.running.rings import sweep_run, sweep_runs
 from hfg.parts.steering.asking import Asking
 from hfg.parts.steering.editing import Drawing
-from hfg.parts.steering.run import Counts, CutRun
+from hfg.parts.steering.reports import Counts, whole_report
+from hfg.parts.steering.run import CutRun
 
 __all__ = ["Distribution", "distribute"]
-
-Reported = TypeVar("Reported")
 
 _LOGGER = Log("hfg.parts")
 _PATIENCE_S = 1.0  # how long a lossy signal may be in transit while nothing else moves
@@ -244,7 +221,9 @@ class Distribution:
         ledger = self._ledgers.get(name)
         kept = None if ledger is None or ledger.entry is None else ledger.entry.data
         lives_of_all, known = dict(self._incarnations), _known_packages()
-        self._say(name, Open(self._drawing.text, self._options, lives_of_all, clock, known, shares, calls, kept))
+        self._say(
+            name, messages.Open(self._drawing.text, self._options, lives_of_all, clock, known, shares, calls, kept)
+        )
 
     def begin(self) -> None:
         """Start all parts after setup, the main part last."""
@@ -257,7 +236,7 @@ class Distribution:
     def _say(self, part: str, message: Message) -> None:
         self._others[part].say(message)
 
-    def _call(self, part: str, call: Call) -> None:
+    def _call(self, part: str, call: messages.Call) -> None:
         if self._others[part].is_there:
             self._say(part, call)
 
@@ -268,30 +247,30 @@ class Distribution:
             return
         self._need_own(other, message)
         match message:
-            case Opened():
+            case messages.Opened():
                 other.answer(None if message.failed is None else self._error(message.failed, other))
-            case AskTime():
-                self._say(other.name, TellTime(message.asked, time.monotonic()))
-            case Rests():
+            case messages.AskTime():
+                self._say(other.name, messages.TellTime(message.asked, time.monotonic()))
+            case messages.Rests():
                 self._agreement.rest(message.rest)
-            case Told():
+            case messages.Told():
                 self._told(message)
-            case Keep():
+            case messages.Keep():
                 if other.name not in self._ledgers or other.is_keeping:
                     raise Untrue("and has no ledger, or does not know yet that its previous data is stored")
                 other.keep(partial(self._keep, other.name, message.number, message.data))
-            case Ended():
+            case messages.Ended():
                 self._ended_there(other, message)
-            case Logged():
+            case messages.Logged():
                 _log(other.name, message, self._loggers)
-            case Result() | Seen():
+            case messages.Result() | messages.Seen():
                 self._asking.hear(other.name, message)
-            case Closed():
+            case messages.Closed():
                 other.close(message)
             case _:
                 raise Untrue("which is not for the main part")
 
-    def _told(self, message: Told) -> None:
+    def _told(self, message: messages.Told) -> None:
         try:
             self._agreement.hear(message.answer)
         except msgspec.ValidationError as error:
@@ -305,19 +284,19 @@ class Distribution:
         """
         name = other.name
         match message:
-            case Opened() | Ended() | Closed():
+            case messages.Opened() | messages.Ended() | messages.Closed():
                 speaker = message.part
-            case Rests():
+            case messages.Rests():
                 speaker = message.rest.part
                 if (set(message.rest.leaving), set(message.rest.coming)) != self._labels[name]:
                     raise Untrue("of other edges than it has")
-            case Told():
+            case messages.Told():
                 speaker = message.answer.part
             case _:
                 return
         if speaker != name:
             raise Untrue(f"for {name_of(speaker):.200}")
-        if isinstance(message, Closed) and not other.is_leaving:
+        if isinstance(message, messages.Closed) and not other.is_leaving:
             raise Untrue("and it has not been told to start")
 
     async def _keep(self, part: str, number: int, data: bytes, say: Callable[[Message], None]) -> None:
@@ -331,7 +310,7 @@ class Distribution:
         except RunError as error:
             self._part.finish("failed", error)
         else:
-            say(Kept(number))
+            say(messages.Kept(number))
 
     def _rests(self, rest: Rest) -> None:
         self._loop.call_soon(self._agreement.rest, rest)
@@ -343,20 +322,20 @@ class Distribution:
         if part == MAIN:
             self._loop.call_soon(lambda: self._agreement.hear(self._part.answer(question)))
         else:
-            self._say(part, Ask(question))
+            self._say(part, messages.Ask(question))
 
     # --- the end ----------------------------------------------------------------------------------------------------
 
-    def _error(self, failed: Failed, other: PeerProcess) -> HfgError:
+    def _error(self, failed: messages.Failed, other: PeerProcess) -> HfgError:
         return as_error(failed, f"the process of group {other.name!r}")
 
     def _ended_here(self) -> None:
         """The main part is over: so are all."""
         for name, other in self._others.items():
             if other.is_there:
-                self._say(name, Finish(self._part.engine.outcome))
+                self._say(name, messages.Finish(self._part.engine.outcome))
 
-    def _ended_there(self, other: PeerProcess, message: Ended) -> None:
+    def _ended_there(self, other: PeerProcess, message: messages.Ended) -> None:
         """Another part has ended, by itself or because it was told to; so all parts end.
 
         Exception: a process that has to leave, because of its agent or a restart, is replaced by another one.
@@ -418,12 +397,12 @@ class Distribution:
             raise UsageError(f'the run has no group "{name}" with a process of its own; it has {there}')
         await other.restart()  # what follows is as when it dies
 
-    def _parts(self) -> list[PartIs]:
+    def _parts(self) -> list[requests.PartIs]:
         """Tell of all parts, the main one first."""
         here = self._session.host
-        told = [PartIs("", here, os.getpid(), "running", 0, self._part.engine.elapsed())]
+        told = [requests.PartIs("", here, os.getpid(), "running", 0, self._part.engine.elapsed())]
         for name, one in self._others.items():
-            told.append(PartIs(name, self._host(name) or here, one.process, one.state, one.restarts, one.up_s))
+            told.append(requests.PartIs(name, self._host(name) or here, one.process, one.state, one.restarts, one.up_s))
         return told
 
     async def _bring_back(self, other: PeerProcess, pause_s: float) -> None:
@@ -437,7 +416,7 @@ class Distribution:
             other.begin(self._channel_to(other))
             for one in self._others.values():
                 if one.is_told:
-                    self._say(one.name, Reborn(name, incarnation))
+                    self._say(one.name, messages.Reborn(name, incarnation))
             await self._launch(other)
             assert self._carrier is not None
             self._carrier.admit(name, incarnation)
@@ -450,7 +429,7 @@ class Distribution:
         if self._has_begun:
             other.let_go()
         if self._part.engine.core.over:  # over meanwhile, when no one could be told
-            self._say(name, Finish(self._part.engine.outcome))
+            self._say(name, messages.Finish(self._part.engine.outcome))
 
     async def close(self) -> None:
         """Let the other parts tear down, take their reports, and see to it that nothing is left of them."""
@@ -462,7 +441,7 @@ class Distribution:
         there = [other for other in self._others.values() if other.is_there]
         for other in there:
             other.leaves()
-            self._say(other.name, Close())
+            self._say(other.name, messages.Close())
         if there:
             await asyncio.wait({other.closed for other in there}, timeout=_LEAVING_S)
         for other in self._others.values():
@@ -489,48 +468,29 @@ class Distribution:
 
     def whole(self, report: Report) -> Report:
         """Put the report of the main part and those of the others together."""
-        nodes = dict(report.nodes)
-        edges = dict(report.edges)
-        errors = list(report.errors)
-        lost = report.lost_activity
-        clocks: dict[str, float] = {}
-        halves: dict[str, dict[str, EdgeReport]] = {MAIN: report.edges}
-        homes = {place: name for name, flat in self._drawing.cutting.parts.items() for place in _places(flat)}
-        goes_on = report.outcome == "running"
-        said: Mapping[str, Counts] = {}
-        if goes_on and isinstance(self._run_of_all, CutRun):
-            said = self._run_of_all.counts()
-        for other in self._others.values():
-            found = said.get(other.name) if goes_on else other.report
-            if found is None:
-                if not goes_on:
-                    errors.append(f'the process of group "{other.name}" has not reported')
-                continue
-            if times := max(other.deaths.count, other.restarts):
-                errors.append(
-                    f'the process of group "{other.name}" was restarted {times} times; its counts from before '
-                    "are not in the report"
-                )
-                errors += [f'group "{other.name}", each time: {what}' for what in self._uncounted(other.name)]
-            nodes |= _own(found.nodes, homes, other.name)
-            edges |= _own(found.edges, homes, other.name)
-            halves[other.name] = found.edges
-            errors += found.errors
-            lost += found.lost_activity
-            if found.clock_within_s:
-                clocks[other.name] = found.clock_within_s
-        for edge in self._drawing.cutting.edges:
-            edges[edge.label] = _joined(edge, halves)
-        order = [node.path for node in _all_nodes(self._drawing.cutting)]
-        return msgspec.structs.replace(
-            report,
-            firings=sum(node.firings for node in nodes.values()),
-            nodes={path: nodes[path] for path in order if path in nodes} | nodes,
-            edges=edges,
-            errors=errors,
-            lost_activity=lost,
-            clocks=clocks,
-        )
+        is_running = report.outcome == "running"
+        counts = self._run_of_all.counts() if is_running and isinstance(self._run_of_all, CutRun) else {}
+        found: dict[str, Counts | messages.Closed] = {}
+        errors: list[str] = []
+        for name, other in self._others.items():
+            counted: Counts | messages.Closed | None = counts.get(name) if is_running else other.report
+            if counted is not None:
+                found[name] = counted
+                errors += self._restarted(other) + counted.errors
+            elif not is_running:
+                errors.append(f'the process of group "{name}" has not reported')
+        return whole_report(report, self._drawing.cutting, found, errors)
+
+    def _restarted(self, other: PeerProcess) -> list[str]:
+        """Return what a part's report lacks because its process was restarted."""
+        times = max(other.deaths.count, other.restarts)
+        if not times:
+            return []
+        return [
+            f'the process of group "{other.name}" was restarted {times} times; its counts from before are not in the '
+            "report",
+            *(f'group "{other.name}", each time: {what}' for what in self._uncounted(other.name)),
+        ]
 
 
 def distribute(
@@ -584,7 +544,7 @@ def distribute(
     )
 
 
-def _log(part: str, logged: Logged, loggers: set[str]) -> None:
+def _log(part: str, logged: messages.Logged, loggers: set[str]) -> None:
     """Hand a record of another part to the loggers here, as if its node were; loggers are never forgotten."""
     if len(loggers) < _MOST_LOGGERS:
         loggers.add(logged.logger)
@@ -603,34 +563,3 @@ def _log(part: str, logged: Logged, loggers: set[str]) -> None:
 def _known_packages() -> list[str]:
     """Return the packages that this program has imported; its other processes may import them."""
     return sorted({name.partition(".")[0] for name in sys.modules})
-
-
-def _all_nodes(cutting: Cutting) -> list[Any]:
-    return [node for flat in cutting.parts.values() for node in flat.nodes]
-
-
-def _own(found: Mapping[str, Reported], homes: Mapping[str, str], part: str) -> dict[str, Reported]:
-    """Return a part's report without items of other parts, but including items that belong to no part."""
-    return {place: one for place, one in found.items() if homes.get(place, part) == part}
-
-
-def _places(flat: FlatGraph) -> Iterator[str]:
-    """Yield the places that a part may report: its nodes, by path, and its edges, by label."""
-    for one in flat.walk():
-        yield from (node.path for node in one.nodes)
-        yield from (edge.label for edge in one.edges)
-
-
-def _joined(edge: CutEdge, halves: Mapping[str, Mapping[str, EdgeReport]]) -> EdgeReport:
-    """Return the counts of an edge, of which each side has one half."""
-    nothing = EdgeReport(sent=0, dropped=0, drained=0, untaken=0, grown=0)
-    source = halves.get(edge.source, {}).get(edge.label, nothing)
-    target = halves.get(edge.target, {}).get(edge.label, nothing)
-    return EdgeReport(
-        sent=source.sent,
-        dropped=source.dropped + target.dropped,
-        drained=source.drained + target.drained,
-        untaken=source.untaken if edge.guarantee == "exact" else target.untaken,
-        grown=source.grown,
-        lost=source.lost + target.lost,
-    )

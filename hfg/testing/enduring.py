@@ -1,26 +1,18 @@
 """Calls node types with hostile values: `python -m hfg.testing.enduring [MODULE or REFERENCE ...]`.
 
-Each type has a process of its own, forked from one that has imported everything. A call is known by its number: what
-ends the process, or does not return, is named with the arguments that caused it, and the calls after it continue in a
-new process. Whatever a node raises is fine here; `usable` checks errors against what is declared.
-Builds on `hostile`, `firing` and the catalogue.
+Each type has a process of its own. A call is known by its number: a call that ends the process, or does not return, is
+reported with its arguments, and the calls after it continue in a new process. A node may raise any error here; `usable`
+checks errors against the declaration. Depends on `hostile`, `firing` and `separate`.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import mmap
-import os
-import resource
-import signal
 import struct
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final
 
 import msgspec
@@ -31,13 +23,11 @@ from hfg.registry import find
 from hfg.testing.firing import fire
 from hfg.testing.hostile import Hostile
 from hfg.testing.samples import sample_folder
-from hfg.testing.usable import HEAP, death, references_of
+from hfg.testing.separate import common_arguments, forked, in_processes, references_of, serve
 from hfg.types import describe_value
 
 __all__ = ["Death", "Endured", "endure", "main"]
 
-_MEMORY_BYTES: Final = 6 << 30
-_FILE_BYTES: Final = 64 << 20
 _STARTING_S: Final = 120.0
 _IN_A_ROW: Final = 4
 """Firings of one node before the next is made: state of one call may harm a later one."""
@@ -61,9 +51,9 @@ class Endured(msgspec.Struct, frozen=True):
     """The result for a type.
 
     Attributes:
-      calls: how many were made.
-      refused: how many of them raised.
-      deaths: the first few.
+      calls: number of calls.
+      refused: number of calls that raised an error.
+      deaths: the first deaths.
       seconds: how long it took.
     """
 
@@ -85,34 +75,28 @@ def endure(
     within_s: float = 3600.0,
     tell: Callable[[Endured], None] | None = None,
 ) -> list[Endured]:
-    """Call node types with hostile values; return what became of each, in their order.
+    """Call node types with hostile values, each in a process of its own. Return the results in their order.
 
     Args:
       references: "module:name" each.
-      calls: of each type.
-      seed: other values with each.
-      limit_s: of processor time for one call.
-      most_deaths: of a type, before it is given up.
-      processes: how many at once; each has its share of the types.
-      within_s: of processor time for one type; a slow one is called less often, and `calls` says how often.
-      tell: is called with each, as soon as it is done; from several threads if there are several processes.
+      calls: calls of each type.
+      seed: each seed gives other values.
+      limit_s: seconds of CPU time for one call.
+      most_deaths: deaths of a type after which it is given up.
+      processes: number of types at a time.
+      within_s: seconds of CPU time for one type; a slow type is called less often, and the result has the number.
+      tell: called with each result as soon as it is there; from several threads if there are several processes.
 
     Raises:
-      RuntimeError: the process that forks the others cannot be started; the message has what it wrote.
+      RuntimeError: a worker has failed; the message has what it wrote.
     """
-    every = list(references)
-    shares = [every[first::processes] for first in range(processes)]
-    task = _Task([], calls, seed, limit_s, most_deaths, within_s)
-    with ThreadPoolExecutor(processes) as pool:
-        tasks = [msgspec.structs.replace(task, references=share) for share in shares]
-        done = list(pool.map(lambda one: _share(one, tell), tasks))
-    return [done[index % processes][index // processes] for index in range(len(every))]
+    how = _How(calls, seed, limit_s, most_deaths, within_s)
+    return in_processes("hfg.testing.enduring", references, how, Endured, processes=processes, tell=tell)
 
 
-class _Task(msgspec.Struct):
-    """What a worker does."""
+class _How(msgspec.Struct):
+    """See `endure`."""
 
-    references: list[str]
     calls: int
     seed: int
     limit_s: float
@@ -120,73 +104,25 @@ class _Task(msgspec.Struct):
     within_s: float
 
 
-def _share(task: _Task, tell: Callable[[Endured], None] | None) -> list[Endured]:
-    """Run a worker. It is a new program, because the C library's checks of the heap are chosen as a program starts."""
-    found: list[Endured] = []
-    with (
-        tempfile.TemporaryFile("w+b") as told,
-        subprocess.Popen(
-            [sys.executable, "-m", "hfg.testing.enduring", "--worker"],
-            env={**os.environ, **HEAP, "PYTHONPATH": os.pathsep.join(one or os.getcwd() for one in sys.path)},  # noqa: PTH109
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=told,
-        ) as worker,
-    ):
-        assert worker.stdin is not None
-        assert worker.stdout is not None
-        worker.stdin.write(msgspec.json.encode(task))
-        worker.stdin.close()
-        for line in worker.stdout:
-            found.append(msgspec.json.decode(line, type=Endured))
-            if tell is not None:
-                tell(found[-1])
-        if worker.wait() != 0 or len(found) < len(task.references):
-            told.seek(0)
-            words = told.read().decode(errors="replace")[-2000:]
-            raise RuntimeError(f"the process that calls node types failed after {len(found)} of them: {words}")
-    return found
-
-
-def _work() -> None:
-    """Be the worker: fork a child for each type."""
-    task = msgspec.json.decode(sys.stdin.buffer.read(), type=_Task)
-    for reference in task.references:
-        find(reference)
-    with contextlib.suppress(ImportError):
-        import cv2
-
-        cv2.setNumThreads(1)  # threads do not survive a fork
-    with sample_folder():
-        pass  # what is in it is made once, and not by each child
-    with os.fdopen(os.dup(1), "wb") as answers:
-        for reference in task.references:
-            answers.write(msgspec.json.encode(_Watch(reference, task).watch()) + b"\n")
-            answers.flush()
-
-
 class _Watch:
     """Runs the calls of one type in forked processes, one after another's death."""
 
-    def __init__(self, reference: str, task: _Task) -> None:
+    def __init__(self, reference: str, how: _How) -> None:
         self._reference = reference
-        self._task = task
+        self._how = how
         self._shared = mmap.mmap(-1, 16)
         self._deaths: list[Death] = []
         self._spent_s = 0.0
 
     def watch(self) -> Endured:
-        start = 0
-        while start < self._task.calls and self._spent_s < self._task.within_s:
-            status, told = self._forked(start)
+        start, how = 0, self._how
+        while start < how.calls and self._spent_s < how.within_s and len(self._deaths) < how.most_deaths:
+            died = self._forked(start)
             call = max(start, self._shown()[0])
-            if status == "":
+            if not died:
                 start = call
                 break
-            self._deaths.append(Death(call, status + told, self._arguments(call)))
-            if len(self._deaths) >= self._task.most_deaths:
-                start = call + 1
-                break
+            self._deaths.append(Death(call, died, _Calls(self._reference, how.seed).shown(call)))
             start = call + 1
         return Endured(self._reference, start, self._shown()[1], tuple(self._deaths), self._spent_s)
 
@@ -194,70 +130,31 @@ class _Watch:
         call, refused = struct.unpack("qq", self._shared[:16])
         return call, refused
 
-    def _forked(self, start: int) -> tuple[str, str]:
-        """Run calls from `start` on in a child; return how it died, "" if it did not, and its last words."""
+    def _forked(self, start: int) -> str:
+        """Run calls from `start` in a forked process. Return how it died, or ""."""
         began = time.monotonic()
         self._shared[:8] = struct.pack("q", start - 1)  # until the first call is made
-        with tempfile.TemporaryFile() as told:
-            pid = os.fork()
-            if pid == 0:
-                code = 1
-                try:
-                    self._child(start, told.fileno())
-                    code = 0
-                finally:
-                    os._exit(code)
-            status = self._waited(pid, start - 1)
-            told.seek(0)
-            words = told.read().decode(errors="replace")
+        died = forked(
+            lambda: self._call(start),
+            lambda call: 4 * self._how.limit_s if call >= start else _STARTING_S,
+            lambda: self._shown()[0],
+        )
         self._spent_s += time.monotonic() - began
-        return (status, "") if not status or status.startswith("did not") else (death(int(status), words), "")
+        return died
 
-    def _waited(self, pid: int, before: int) -> str:
-        """Wait for the child, and end it when one call takes too long; `before` is the number before its first."""
-        last, since = -1, time.monotonic()
-        pause_s = 0.001
-        while True:
-            done, status = os.waitpid(pid, os.WNOHANG)
-            if done:
-                code = os.waitstatus_to_exitcode(status)
-                return "" if code == 0 else str(code)
-            call = self._shown()[0]
-            if call != last:
-                last, since = call, time.monotonic()
-            elif time.monotonic() - since > (4 * self._task.limit_s if call > before else _STARTING_S):
-                os.kill(pid, signal.SIGKILL)
-                os.waitpid(pid, 0)
-                return f"did not return within {4 * self._task.limit_s:g} s"
-            time.sleep(pause_s)
-            pause_s = min(0.05, 2 * pause_s)
-
-    def _child(self, start: int, errors: int) -> None:
+    def _call(self, start: int) -> None:
         """Make the calls; the number of each is in shared memory before it starts."""
-        nowhere = os.open(os.devnull, os.O_RDWR)
-        for stream in (0, 1):
-            os.dup2(nowhere, stream)
-        os.dup2(errors, 2)
-        for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1, signal.SIGUSR2):
-            signal.signal(one, lambda *_: None)  # there are nodes that raise them
-        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
-        resource.setrlimit(resource.RLIMIT_FSIZE, (_FILE_BYTES, _FILE_BYTES))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        refused = self._shown()[1]
-        until = time.process_time() + self._task.within_s - self._spent_s
+        refused, how = self._shown()[1], self._how
+        until = time.process_time() + how.within_s - self._spent_s
         with sample_folder(), np.errstate(all="ignore"):
-            calls = _Calls(self._reference, self._task.seed)
+            calls = _Calls(self._reference, how.seed)
             number = start
-            while number < self._task.calls and time.process_time() < until:
+            while number < how.calls and time.process_time() < until:
                 self._shared[:16] = struct.pack("qq", number, refused)
                 refused += not calls.call(number)
                 number += 1
             calls.close()
             self._shared[:16] = struct.pack("qq", number, refused)
-
-    def _arguments(self, call: int) -> str:
-        return _Calls(self._reference, self._task.seed).shown(call)
 
 
 class _Calls:
@@ -345,21 +242,16 @@ def _short(value: Any) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Call what is named, else all that is installed; report deaths. Exit code 1 if there are any."""
-    parser = argparse.ArgumentParser(prog="python -m hfg.testing.enduring", description=main.__doc__)
-    parser.add_argument("what", nargs="*", help="a module, or a reference module:name; without it all there is")
-    parser.add_argument("--calls", type=int, default=100, help="of each type (100)")
-    parser.add_argument("--seed", type=int, default=0, help="other values with each (0)")
-    parser.add_argument("--limit", type=float, default=20.0, help="seconds of processor time for one call (20)")
-    parser.add_argument("--within", type=float, default=3600.0, help="seconds of processor time for one type (3600)")
-    parser.add_argument("--deaths", type=int, default=5, help="of a type, before it is given up (5)")
-    parser.add_argument("--processes", type=int, default=1, help="how many at once (1)")
+    """Call node types with hostile values, and report deaths. The exit code is 1 if there are any."""
+    parser = common_arguments("hfg.testing.enduring", main.__doc__)
+    parser.add_argument("--calls", type=int, default=100, help="calls of each type (100)")
+    parser.add_argument("--limit", type=float, default=20.0, help="seconds of CPU time for one call (20)")
+    parser.add_argument("--within", type=float, default=3600.0, help="seconds of CPU time for one type (3600)")
+    parser.add_argument("--deaths", type=int, default=5, help="deaths of a type after which it is given up (5)")
     parser.add_argument("--verbose", "-v", action="store_true", help="write a line for each type as soon as it is done")
-    parser.add_argument("--json", action="store_true", help="write what became of each type as JSON")
-    parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args(arguments)
     if given.worker:
-        _work()
+        serve(_How, lambda reference, how: _Watch(reference, how).watch())
         return 0
     references, problems = references_of(given.what)
     found = endure(

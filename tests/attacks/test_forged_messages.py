@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 import struct
 from collections.abc import Callable
-from typing import Any, get_args
+from typing import Any
 
 import msgspec
 import pytest
@@ -27,12 +27,12 @@ from hfg.links.frames import (
 )
 from hfg.links.offers import read_introduction
 from hfg.links.producer import ExactProducer
-from hfg.parts.model.messages import Message, pack, unpack
+from hfg.parts.model.messages import KINDS, pack, unpack
 
 pytestmark = pytest.mark.rule("L4")
 
 SEEDS: tuple[int, ...] = (1, 2)
-MESSAGES: tuple[Any, ...] = get_args(Message)
+MESSAGES: tuple[Any, ...] = KINDS
 FRAMES: tuple[Any, ...] = (Tokens, Probe, Status)
 
 

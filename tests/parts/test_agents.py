@@ -12,31 +12,11 @@ import pytest
 import hfg
 from hfg.engine.face.watching import Answer, Question
 from hfg.errors import NoAnswer, QueryRefused, TransportError
+from hfg.parts.hosts import requests
 from hfg.parts.hosts.agent import Agent
-from hfg.parts.hosts.realm import (
-    GONE_S,
-    Check,
-    Chunk,
-    Deploy,
-    Done,
-    End,
-    Gone,
-    Look,
-    Missing,
-    Parts,
-    PartsAre,
-    Realm,
-    Restart,
-    RunIs,
-    Seen,
-    Start,
-    Started,
-    Stop,
-    Wait,
-    agent_place,
-    ask,
-)
+from hfg.parts.hosts.realm import GONE_S, Realm, RunIs, agent_place
 from hfg.parts.hosts.remote_parts import AgentLauncher
+from hfg.parts.hosts.requests import ask
 from hfg.parts.processes import launching
 from hfg_transports.memory import MemorySession, Network
 
@@ -79,20 +59,20 @@ class Computer:
         self._launcher = OnTheLoop(network=network)
         self._numbers = iter(range(1, 100))
 
-    async def part(self, order: Start) -> Any:
+    async def part(self, order: requests.Start) -> Any:
         task = await self._launcher.launch(order.run, order.part, "", order.incarnations)
         task.process = next(self._numbers)
         self.begun.setdefault(order.part, []).append(task)
         return task
 
-    async def main(self, order: Deploy) -> Any:
+    async def main(self, order: requests.Deploy) -> Any:
         raise AssertionError("nothing is deployed here")
 
-    def missing(self, modules: list[str]) -> Missing:
-        return Missing([one for one in modules if one in self.absent], "/robot")
+    def missing(self, modules: list[str]) -> requests.Missing:
+        return requests.Missing([one for one in modules if one in self.absent], "/robot")
 
-    def read_log(self, run: str, offset: int) -> Chunk:
-        return Chunk("", 0)
+    def read_log(self, run: str, offset: int) -> requests.Chunk:
+        return requests.Chunk("", 0)
 
     def forget(self, run: str) -> None:
         self.forgotten.append(run)
@@ -274,7 +254,7 @@ def test_while_an_agent_is_gone_all_wait_and_with_the_next_one_they_go_on(world:
             world.kill("arm")
             await asyncio.sleep(60)
             (place,) = realm.runs
-            told = await ask(realm.session, place, Parts(), PartsAre)
+            told = await ask(realm.session, place, requests.Parts())
             await world.agent("arm")
             await run.wait_finished()
             return await reading, [part.state for part in told.parts]
@@ -349,9 +329,9 @@ def test_a_part_is_restarted_when_somebody_asks_for_it_and_that_is_no_death(worl
             (place,) = realm.runs
             for _ in range(7):  # more often than deaths are forgiven
                 await asyncio.sleep(1.0)
-                await ask(realm.session, place, Restart("on_arm"), Done)
+                await ask(realm.session, place, requests.Restart("on_arm"))
             await asyncio.sleep(1.0)
-            told = await ask(realm.session, place, Parts(), PartsAre)
+            told = await ask(realm.session, place, requests.Parts())
             await run.wait_finished()
             return await reading, [(part.group, part.host, part.restarts) for part in told.parts]
 
@@ -368,7 +348,7 @@ def test_who_looks_at_a_run_from_another_host_sees_its_table_and_no_port(world: 
             (place,) = realm.runs
 
             async def look(question: Question) -> Answer:
-                told = await ask(realm.session, place, Look(msgspec.json.encode(question)), Seen)
+                told = await ask(realm.session, place, requests.Look(msgspec.json.encode(question)))
                 return msgspec.json.decode(told.answer, type=Answer)
 
             return await look(Question("glance")), await look(Question("tap", path="numbers.out"))
@@ -394,7 +374,7 @@ def test_what_is_asked_in_vain_of_a_run_is_refused_with_what_there_is(world: Wor
         realm = await world.realm()
         async with hfg.running(chain("arm"), clock="virtual"):
             (place,) = realm.runs
-            await ask(realm.session, place, Restart("leg"), Done)
+            await ask(realm.session, place, requests.Restart("leg"))
 
     with pytest.raises(QueryRefused, match='^the run has no group "leg" with a process of its own; it has "on_arm"'):
         play(world, scene)
@@ -408,7 +388,7 @@ def test_a_run_is_stopped_from_outside_and_is_told_of_no_more(world: World) -> N
         await realm.until(lambda: realm.runs, 10)
         await asyncio.sleep(1.0)
         (place,) = realm.runs
-        await ask(realm.session, place, Stop(), Done)
+        await ask(realm.session, place, requests.Stop())
         report = await running
         await asyncio.sleep(0)
         return report.outcome, len(realm.runs), len(world.computers["arm"].forgotten)
@@ -425,8 +405,8 @@ def test_of_two_lives_the_agent_begins_the_next_when_the_former_is_gone_and_an_o
         place, begun = agent_place(agent.me), world.computers["arm"].begun
 
         async def start(life: int) -> int:
-            order = Start("hfg/one", "far", (life, 1), [], 0)
-            return (await ask(realm.session, place, order, Started)).process
+            order = requests.Start("hfg/one", "far", (life, 1), [], 0)
+            return (await ask(realm.session, place, order)).process
 
         assert [await start(1), await start(1), await start(2)] == [1, 1, 2]
         first, second = begun["far"]
@@ -434,9 +414,9 @@ def test_of_two_lives_the_agent_begins_the_next_when_the_former_is_gone_and_an_o
         assert not second._task.done()
         with pytest.raises(QueryRefused, match="incarnation 1 of group"):
             await start(1)
-        assert "no process of it" in (await ask(realm.session, place, Wait("hfg/one", "far", 1), Gone)).how
-        assert (await ask(realm.session, place, Wait("hfg/one", "far", 2), Gone, timeout_s=60)).how == ""
-        await ask(realm.session, place, End("hfg/one", "far", 2), Done)
+        assert "no process of it" in (await ask(realm.session, place, requests.Wait("hfg/one", "far", 1))).how
+        assert (await ask(realm.session, place, requests.Wait("hfg/one", "far", 2), timeout_s=60)).how == ""
+        await ask(realm.session, place, requests.End("hfg/one", "far", 2))
         assert second._task.done()
 
     play(world, scene)
@@ -447,9 +427,9 @@ def test_what_is_no_question_is_refused_with_a_sentence(world: World) -> None:
         agent = await world.agent("arm")
         realm = await world.realm()
         with pytest.raises(QueryRefused, match="^the question cannot be understood"):
-            await realm.session.ask(f"{agent_place(agent.me)}/{Check.verb}", b"\xff")
+            await realm.session.ask(f"{agent_place(agent.me)}/{requests.Check.verb}", b"\xff")
         with pytest.raises(NoAnswer):
-            await ask(realm.session, "agents/arm/nobody", Check([]), Missing)
+            await ask(realm.session, "agents/arm/nobody", requests.Check([]))
 
     play(world, scene)
 

@@ -1,6 +1,7 @@
 """Parts on other hosts.
 
-realm         agents and runs: how to find them, and requests to them
+realm         agents and runs, and how to find them
+requests      requests to them
 agent         starts parts on its host
 hosting       the processes that it uses for this, and their output
 remote_parts  launching by agents

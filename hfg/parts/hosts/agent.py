@@ -9,34 +9,15 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, TypeAlias
 
 import msgspec
 
 from hfg.base.logs import Log
 from hfg.errors import HfgError, TransportError, UsageError, in_words
-from hfg.parts.hosts.realm import (
-    GONE_S,
-    AgentIs,
-    Begins,
-    Check,
-    Chunk,
-    Deploy,
-    Done,
-    End,
-    Gone,
-    Missing,
-    ReadLog,
-    Realm,
-    Start,
-    Started,
-    Wait,
-    agent_place,
-    myself,
-    run_id,
-    run_place,
-    serve,
-)
+from hfg.parts.hosts import requests
+from hfg.parts.hosts.realm import GONE_S, AgentIs, Realm, agent_place, myself, run_id, run_place
+from hfg.parts.hosts.requests import serve
 from hfg.parts.processes.peer_process import Launched
 from hfg.transport import Closing, Session
 
@@ -49,26 +30,27 @@ WAITS_S: Final = 10.0
 
 _LOOKS_S: Final = 0.5  # time to look for another agent of the same name before announcing this one
 _MAIN: Final = ""
+Order: TypeAlias = requests.Start | requests.Deploy
 _FIRST_INCARNATION: Final = 1
 
 
 class Computer(Protocol):
     """The agent's interface to the computer that it runs on."""
 
-    async def part(self, order: Start) -> Launched:
+    async def part(self, order: requests.Start) -> Launched:
         """Start a part.
 
         Raises:
           HfgError: it cannot be started.
         """
 
-    async def main(self, order: Deploy) -> Launched:
+    async def main(self, order: requests.Deploy) -> Launched:
         """Begin the main part of a run."""
 
-    def missing(self, modules: list[str]) -> Missing:
+    def missing(self, modules: list[str]) -> requests.Missing:
         """Return the modules that cannot be imported."""
 
-    def read_log(self, run: str, offset: int) -> Chunk:
+    def read_log(self, run: str, offset: int) -> requests.Chunk:
         """Return output of the parts of a run."""
 
     def forget(self, run: str) -> None:
@@ -148,13 +130,13 @@ class Agent:
             session,
             agent_place(self.me),
             {
-                Check: self._check,
-                Start: self._start,
-                Deploy: self._deploy,
-                Begins: self._begins,
-                Wait: self._wait,
-                End: self._end,
-                ReadLog: self._read_log,
+                requests.Check: self._check,
+                requests.Start: self._start,
+                requests.Deploy: self._deploy,
+                requests.Begins: self._begins,
+                requests.Wait: self._wait,
+                requests.End: self._end,
+                requests.ReadLog: self._read_log,
             },
         )
         self._announced = session.announce(agent_place(self.me), msgspec.msgpack.encode(self.me))
@@ -220,16 +202,16 @@ class Agent:
 
     # --- what it is asked -------------------------------------------------------------------------------------------
 
-    async def _check(self, request: Check) -> Missing:
+    async def _check(self, request: requests.Check) -> requests.Missing:
         return self._computer.missing(request.modules)
 
-    async def _start(self, order: Start) -> Started:
+    async def _start(self, order: requests.Start) -> requests.Started:
         return await self._take((order.run, order.part), order.incarnations[0], order)
 
-    async def _deploy(self, order: Deploy) -> Started:
+    async def _deploy(self, order: requests.Deploy) -> requests.Started:
         return await self._take((order.run, _MAIN), _FIRST_INCARNATION, order)
 
-    async def _take(self, key: tuple[str, str], incarnation: int, order: Start | Deploy) -> Started:
+    async def _take(self, key: tuple[str, str], incarnation: int, order: Order) -> requests.Started:
         if self._is_closing:
             raise UsageError(f'the agent of host "{self.me.host}" is being ended')
         charge = self._charges.get(key)
@@ -237,20 +219,27 @@ class Agent:
             former, charge = charge, _Incarnation(incarnation)
             self._charges[key] = charge
             charge.task = asyncio.create_task(self._run(charge, former, key, order), name=f"hfg part {key[1]}")
-            if isinstance(order, Start):
+            if isinstance(order, requests.Start):
                 self._look_at(key[0])
         elif charge.incarnation > incarnation:
             raise UsageError(f'incarnation {incarnation} of group "{key[1]}" is over: {charge.incarnation} has started')
-        return Started((await asyncio.shield(charge.begun)).process)
+        return requests.Started((await asyncio.shield(charge.begun)).process)
 
     async def _run(
-        self, charge: _Incarnation, former: _Incarnation | None, key: tuple[str, str], order: Start | Deploy
+        self,
+        charge: _Incarnation,
+        former: _Incarnation | None,
+        key: tuple[str, str],
+        order: Order,
     ) -> None:
         """Run one incarnation: wait for the end of the previous one, start it, and wait for its end."""
         try:
             if former is not None:
                 await former.end()
-            hosted = await (self._computer.part(order) if isinstance(order, Start) else self._computer.main(order))
+            if isinstance(order, requests.Deploy):
+                hosted = await self._computer.main(order)
+            else:
+                hosted = await self._computer.part(order)
         except Exception as error:
             known = error if isinstance(error, HfgError) else TransportError(f"it cannot be started: {in_words(error)}")
             charge.begun.set_exception(known)
@@ -265,28 +254,28 @@ class Agent:
             self._charges.pop(key, None)
             self._done_with(key[0])
 
-    def _of(self, request: Begins | Wait | End) -> _Incarnation | None:
+    def _of(self, request: requests.Begins | requests.Wait | requests.End) -> _Incarnation | None:
         charge = self._charges.get((request.run, request.part))
         return charge if charge is not None and charge.incarnation == request.incarnation else None
 
-    async def _begins(self, request: Begins) -> Done:
+    async def _begins(self, request: requests.Begins) -> requests.Done:
         charge = self._of(request)
         if charge is not None and charge.begun.done() and charge.begun.exception() is None:
             charge.begun.result().begins()
-        return Done()
+        return requests.Done()
 
-    async def _wait(self, request: Wait) -> Gone:
+    async def _wait(self, request: requests.Wait) -> requests.Gone:
         charge = self._of(request)
         if charge is None:
-            return Gone(f'the agent of host "{self.me.host}" has no process of it')
+            return requests.Gone(f'the agent of host "{self.me.host}" has no process of it')
         await asyncio.wait({charge.gone}, timeout=WAITS_S)
-        return Gone(charge.gone.result() if charge.gone.done() else "")
+        return requests.Gone(charge.gone.result() if charge.gone.done() else "")
 
-    async def _end(self, request: End) -> Done:
+    async def _end(self, request: requests.End) -> requests.Done:
         charge = self._of(request)
         if charge is not None:
             await self._let_go((request.run, request.part), charge)
-        return Done()
+        return requests.Done()
 
     async def _let_go(self, key: tuple[str, str], charge: _Incarnation) -> None:
         await charge.end()
@@ -301,5 +290,5 @@ class Agent:
                 leaving.cancel()
             self._computer.forget(run)
 
-    async def _read_log(self, request: ReadLog) -> Chunk:
+    async def _read_log(self, request: requests.ReadLog) -> requests.Chunk:
         return self._computer.read_log(request.run, request.offset)

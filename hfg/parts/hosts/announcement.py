@@ -16,20 +16,9 @@ from hfg.engine import Run
 from hfg.engine.face.watching import Door
 from hfg.engine.face.watching import Question as Asked
 from hfg.engine.observing.encoding import encode
-from hfg.parts.hosts.realm import (
-    Done,
-    Look,
-    PartIs,
-    Parts,
-    PartsAre,
-    Restart,
-    RunIs,
-    Seen,
-    Stop,
-    run_id,
-    run_place,
-    serve,
-)
+from hfg.parts.hosts import requests
+from hfg.parts.hosts.realm import RunIs, run_id, run_place
+from hfg.parts.hosts.requests import serve
 from hfg.transport import Session
 
 __all__ = ["Announcement"]
@@ -43,7 +32,7 @@ class Announcement:
         session: Session,
         run: str,
         face: Run,
-        parts: Callable[[], list[PartIs]],
+        parts: Callable[[], list[requests.PartIs]],
         restart: Callable[[str], Awaitable[None]],
     ) -> None:
         """Start.
@@ -63,10 +52,10 @@ class Announcement:
         place = run_place(run)
         me = RunIs(run_id(run), face.graph.name, target, session.host, os.getpid())
         answers: dict[Any, Callable[[Any], Awaitable[Any]]] = {
-            Parts: self._tell,
-            Stop: self._stop,
-            Restart: self._begin_again,
-            Look: self._look,
+            requests.Parts: self._tell,
+            requests.Stop: self._stop,
+            requests.Restart: self._begin_again,
+            requests.Look: self._look,
         }
         self._open = [*serve(session, place, answers), session.announce(place, msgspec.msgpack.encode(me))]
 
@@ -75,22 +64,22 @@ class Announcement:
         for one in reversed(self._open):
             one.close()
 
-    async def _tell(self, _: Parts) -> PartsAre:
-        return PartsAre(self._parts())
+    async def _tell(self, _: requests.Parts) -> requests.PartsAre:
+        return requests.PartsAre(self._parts())
 
-    async def _stop(self, _: Stop) -> Done:
+    async def _stop(self, _: requests.Stop) -> requests.Done:
         self._run.stop()
-        return Done()
+        return requests.Done()
 
-    async def _begin_again(self, request: Restart) -> Done:
+    async def _begin_again(self, request: requests.Restart) -> requests.Done:
         await self._restart(request.part)
-        return Done()
+        return requests.Done()
 
-    async def _look(self, request: Look) -> Seen:
+    async def _look(self, request: requests.Look) -> requests.Seen:
         answer = self._door.answer(request.question)
         if isinstance(answer, Asked):
             answer = msgspec.structs.replace(
                 self._door.name,
                 error="tokens at a port can be tapped only on the host of the main part: run hfg tap there",
             )
-        return Seen(encode(answer))
+        return requests.Seen(encode(answer))

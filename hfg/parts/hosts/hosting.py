@@ -20,7 +20,8 @@ import msgspec
 
 from hfg.base.private import open_private, state_folder
 from hfg.errors import TransportError
-from hfg.parts.hosts.realm import Chunk, Deploy, Missing, Start, run_id
+from hfg.parts.hosts import requests
+from hfg.parts.hosts.realm import run_id
 from hfg.parts.processes.launching import Instructions, PartProcess, beat_of
 from hfg.parts.processes.rendezvous import Rendezvous
 from hfg.parts.processes.standby import Standby
@@ -70,7 +71,7 @@ class ThisComputer:
         self._standby = Standby(keeps_output=True)
         self._places: dict[str, Rendezvous] = {}  # of the parts of each run that are here
 
-    async def part(self, order: Start) -> PartProcess:
+    async def part(self, order: requests.Start) -> PartProcess:
         """See `Computer`."""
         incarnation = order.incarnations[0]
         begun = Instructions(
@@ -97,7 +98,7 @@ class ThisComputer:
             self._places[run] = Rendezvous()
         return self._places[run]
 
-    async def main(self, order: Deploy) -> PartProcess:
+    async def main(self, order: requests.Deploy) -> PartProcess:
         """See `Computer`."""
         folder = order.folder or str(self._folder)
         if not _is_folder(folder):
@@ -107,11 +108,11 @@ class ThisComputer:
         self._journal.keep(order.run, "main", process)
         return process
 
-    def missing(self, modules: list[str]) -> Missing:
+    def missing(self, modules: list[str]) -> requests.Missing:
         """See `Computer`."""
-        return Missing([one for one in modules if not is_importable(one, self._path)], str(self._folder))
+        return requests.Missing([one for one in modules if not is_importable(one, self._path)], str(self._folder))
 
-    def read_log(self, run: str, offset: int) -> Chunk:
+    def read_log(self, run: str, offset: int) -> requests.Chunk:
         """See `Computer`."""
         return self._journal.read(run, offset)
 
@@ -227,14 +228,14 @@ class Journal:
         except OSError:
             pass  # the disk is full: the run continues
 
-    def read(self, run: str, offset: int) -> Chunk:
+    def read(self, run: str, offset: int) -> requests.Chunk:
         """Return part of it, from a byte on; from the start, if the file has been started over."""
         file = self._file(run)
         if not file.exists():
-            return Chunk("", 0)
+            return requests.Chunk("", 0)
         with file.open("rb") as stream:
             stream.seek(offset if 0 <= offset <= file.stat().st_size else 0)
             begin = stream.tell()
             data = stream.read(_LONGEST_CHUNK)
         data = data[: data.rfind(b"\n") + 1]
-        return Chunk(data.decode(errors="replace"), begin + len(data))
+        return requests.Chunk(data.decode(errors="replace"), begin + len(data))

@@ -1,9 +1,7 @@
-"""The agents and runs in a realm, and requests to them.
+"""The agents and runs in a realm.
 
 An agent announces `agents/<host>/<incarnation>`, the main part of a run `runs/<run>`, each with a description of
-itself. They answer questions at names below these: names that start with "ro" only read, so viewers may use them; those
-with "rw" change something. Questions and answers are data of declared types (rule L4). Depends on the contract of
-transports.
+itself. They answer `requests` at names below these. Depends on the contract of transports.
 """
 
 from __future__ import annotations
@@ -14,15 +12,15 @@ import importlib.metadata
 import os
 import platform
 import uuid
-from collections.abc import Awaitable, Callable, Iterable, Mapping
-from typing import Any, ClassVar, Final, TypeVar
+from collections.abc import Callable, Iterable
+from typing import Any, Final
 
 import msgspec
 
 from hfg.base.controls import cleaned
 from hfg.base.logs import Log
-from hfg.errors import TransportError, UsageError
-from hfg.transport import Closing, Presence, Session
+from hfg.errors import TransportError
+from hfg.transport import Presence, Session
 
 __all__ = [
     "AGENTS",
@@ -30,34 +28,13 @@ __all__ = [
     "GONE_S",
     "RUNS",
     "AgentIs",
-    "Begins",
-    "Check",
-    "Chunk",
-    "Deploy",
-    "Done",
-    "End",
-    "Gone",
-    "Look",
-    "Missing",
-    "PartIs",
-    "Parts",
-    "PartsAre",
-    "ReadLog",
     "Realm",
-    "Restart",
     "RunIs",
-    "Seen",
-    "Start",
-    "Started",
-    "Stop",
-    "Wait",
     "agent_place",
-    "ask",
     "myself",
     "named",
     "run_id",
     "run_place",
-    "serve",
 ]
 
 _LOGGER = Log("hfg.parts")
@@ -70,8 +47,6 @@ FINDS_S: Final = 3.0
 
 GONE_S: Final = 5.0
 """For how long agents and runs wait for each other when a connection is away; then the other counts as gone."""
-
-_T = TypeVar("_T")
 
 
 def agent_place(agent: AgentIs) -> str:
@@ -131,208 +106,6 @@ class RunIs(msgspec.Struct, frozen=True):
     target: str
     host: str
     process: int
-
-
-class PartIs(msgspec.Struct, frozen=True):
-    """The main part's information about a part.
-
-    Attributes:
-      group: its name; "" is the main part.
-      host, process: where it runs.
-      state: "starting", "running", "returning" (it has died, and will be restarted).
-      restarts: how often it was restarted.
-      up_s: age of its process in seconds.
-    """
-
-    group: str
-    host: str
-    process: int
-    state: str
-    restarts: int
-    up_s: float
-
-
-# --- what an agent is asked ---
-
-
-class Check(msgspec.Struct, frozen=True):
-    """Which of these modules cannot be imported? -> Missing."""
-
-    verb: ClassVar[str] = "rw/check"
-    modules: list[str]
-
-
-class Missing(msgspec.Struct, frozen=True):
-    """The missing modules, and the folder in which the agent looks for modules."""
-
-    modules: list[str]
-    folder: str
-
-
-class Start(msgspec.Struct, frozen=True):
-    """Start a part -> Started. A repeated request starts it only once.
-
-    Attributes:
-      run, part: names of both.
-      incarnations: its incarnation, and that of the main part.
-      argv: arguments of the main program.
-      level: level of the log records that it wants.
-    """
-
-    verb: ClassVar[str] = "rw/start"
-    run: str
-    part: str
-    incarnations: tuple[int, int]
-    argv: list[str]
-    level: int
-
-
-class Deploy(msgspec.Struct, frozen=True):
-    """Run a graph: start its main part -> Started.
-
-    Attributes:
-      run: its name.
-      target: the graph.
-      arguments: arguments of `hfg run`.
-      folder: folder of the target; "": the folder in which the agent was started.
-    """
-
-    verb: ClassVar[str] = "rw/deploy"
-    run: str
-    target: str
-    arguments: list[str]
-    folder: str
-
-
-class Started(msgspec.Struct, frozen=True):
-    """It has started, as this process."""
-
-    process: int
-
-
-class _OfAPart(msgspec.Struct, frozen=True):
-    """A verb for one incarnation of a part of a run."""
-
-    run: str
-    part: str
-    incarnation: int
-
-
-class Begins(_OfAPart, frozen=True):
-    """The nodes of a part are let go: it may be expected to answer from now on -> Done."""
-
-    verb: ClassVar[str] = "rw/begins"
-
-
-class Wait(_OfAPart, frozen=True):
-    """Wait until a part is gone, for a limited time -> Gone."""
-
-    verb: ClassVar[str] = "rw/wait"
-
-
-class Gone(msgspec.Struct, frozen=True):
-    """How it has ended; "" if it is still there."""
-
-    how: str
-
-
-class End(_OfAPart, frozen=True):
-    """See to it that a part is gone -> Done."""
-
-    verb: ClassVar[str] = "rw/end"
-
-
-class ReadLog(msgspec.Struct, frozen=True):
-    """The output of a run's parts on this host, from some byte on -> Chunk."""
-
-    verb: ClassVar[str] = "ro/log"
-    run: str
-    offset: int
-
-
-class Chunk(msgspec.Struct, frozen=True):
-    """Whole lines, and the offset after them."""
-
-    text: str
-    offset: int
-
-
-class Done(msgspec.Struct, frozen=True):
-    """The request was executed."""
-
-
-# --- what a run is asked ---
-
-
-class Parts(msgspec.Struct, frozen=True):
-    """Which parts have you -> PartsAre."""
-
-    verb: ClassVar[str] = "ro/parts"
-
-
-class PartsAre(msgspec.Struct, frozen=True):
-    """They, the main part first."""
-
-    parts: list[PartIs]
-
-
-class Look(msgspec.Struct, frozen=True):
-    """The request that `hfg top` sends through a socket -> Seen."""
-
-    verb: ClassVar[str] = "ro/look"
-    question: bytes
-
-
-class Seen(msgspec.Struct, frozen=True):
-    """The answer to it."""
-
-    answer: bytes
-
-
-class Stop(msgspec.Struct, frozen=True):
-    """End well -> Done."""
-
-    verb: ClassVar[str] = "rw/stop"
-
-
-class Restart(msgspec.Struct, frozen=True):
-    """End the process of a part and start another -> Done, when that is in progress."""
-
-    verb: ClassVar[str] = "rw/restart"
-    part: str
-
-
-# --- asking and answering ---
-
-
-async def ask(session: Session, place: str, request: Any, answer: type[_T], *, timeout_s: float = 5.0) -> _T:
-    """Ask an agent or a run.
-
-    Raises:
-      NoAnswer: there is no answer, or not in time.
-      QueryRefused: it refuses; with its message.
-    """
-    told = await session.ask(f"{place}/{request.verb}", msgspec.msgpack.encode(request), timeout_s=timeout_s)
-    try:
-        return cleaned(msgspec.msgpack.decode(told, type=answer))
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        raise TransportError(f'"{place}" answers what this version of hfg cannot read: {error}') from None
-
-
-def serve(session: Session, place: str, answers: Mapping[Any, Callable[[Any], Awaitable[Any]]]) -> list[Closing]:
-    """Answer questions, each by its type."""
-
-    def answering(kind: type, answer: Callable[[Any], Awaitable[Any]]) -> Callable[[bytes], Awaitable[bytes]]:
-        async def reply(question: bytes) -> bytes:
-            try:
-                request: Any = msgspec.msgpack.decode(question, type=kind)
-            except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-                raise UsageError(f"the question cannot be understood: {error}") from None
-            return msgspec.msgpack.encode(await answer(request))
-
-        return reply
-
-    return [session.answer(f"{place}/{kind.verb}", answering(kind, answer)) for kind, answer in answers.items()]
 
 
 class Realm:

@@ -13,30 +13,14 @@ import logging
 import sys
 from collections.abc import Mapping
 from contextvars import ContextVar
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 
 from hfg.base.logs import Log
 from hfg.errors import HfgError, NoAnswer, QueryRefused, TransportError
+from hfg.parts.hosts import requests
 from hfg.parts.hosts.agent import WAITS_S
-from hfg.parts.hosts.realm import (
-    FINDS_S,
-    GONE_S,
-    AgentIs,
-    Begins,
-    Check,
-    Done,
-    End,
-    Gone,
-    Missing,
-    Realm,
-    Start,
-    Started,
-    Wait,
-    agent_place,
-    ask,
-    myself,
-    named,
-)
+from hfg.parts.hosts.realm import FINDS_S, GONE_S, AgentIs, Realm, agent_place, myself, named
+from hfg.parts.hosts.requests import Request, ask
 from hfg.parts.processes.peer_process import Launched, Launcher
 from hfg.transport import Session
 
@@ -112,7 +96,7 @@ class AgentLauncher:
                     f'host "{host}" cannot import the type of "{path}", which is in the program itself '
                     f"({_in_words(module)}): move the node types into a module, and have that on all hosts"
                 ]
-            there = await self._ask(agent, Check(sorted(modules)), Missing)
+            there = await self.ask(agent, requests.Check(sorted(modules)))
         except HfgError as error:
             return [str(error)]
         if not there.modules:
@@ -131,12 +115,12 @@ class AgentLauncher:
         if not host:
             return await self._here.launch(run, part, host, incarnations)
         assert self._realm is not None
-        order = Start(run, part, incarnations, sys.argv, logging.getLogger("hfg").getEffectiveLevel())
+        order = requests.Start(run, part, incarnations, sys.argv, logging.getLogger("hfg").getEffectiveLevel())
         is_first = incarnations[0] == _FIRST_INCARNATION
         while True:
             agent = await self._agent(part, host, FINDS_S if is_first else None)
             try:
-                started = await self._ask(agent, order, Started, timeout_s=_STARTS_S)
+                started = await self.ask(agent, order, timeout_s=_STARTS_S)
             except NoAnswer:
                 if is_first:
                     raise
@@ -155,27 +139,31 @@ class AgentLauncher:
         assert self._realm is not None
         return any(one.incarnation != agent.incarnation for one in self._realm.of(agent.host))
 
-    async def _ask(self, agent: AgentIs, request: Any, answer: type[_T], *, timeout_s: float = 5.0) -> _T:
+    async def ask(self, agent: AgentIs, request: Request[_T], *, timeout_s: float = 5.0) -> _T:
+        """Ask an agent.
+
+        Raises:
+          NoAnswer: it does not answer.
+          TransportError: it refuses.
+        """
         assert self._session is not None
         try:
-            return await ask(self._session, agent_place(agent), request, answer, timeout_s=timeout_s)
+            return await ask(self._session, agent_place(agent), request, timeout_s=timeout_s)
         except NoAnswer:
             raise NoAnswer(f'the agent of host "{agent.host}" does not answer; is it being ended?') from None
         except QueryRefused as error:
             raise TransportError(f'the agent of host "{agent.host}" refuses: {error}') from None
 
-    ask = _ask
-
 
 class _RemotePart:
     """A part that an agent has started."""
 
-    def __init__(self, launcher: AgentLauncher, agent: AgentIs, order: Start, process: int) -> None:
+    def __init__(self, launcher: AgentLauncher, agent: AgentIs, order: requests.Start, process: int) -> None:
         self.process = process
         self._launcher = launcher
         self._agent = agent
         self._which = (order.run, order.part, order.incarnations[0])
-        self._telling: asyncio.Task[Done] | None = None
+        self._telling: asyncio.Task[requests.Done] | None = None
 
     async def wait(self) -> str:
         """See `Launched`.
@@ -186,7 +174,7 @@ class _RemotePart:
         silent_since: float | None = None
         while True:
             try:
-                told = await self._launcher.ask(self._agent, Wait(*self._which), Gone, timeout_s=WAITS_S + FINDS_S)
+                told = await self._launcher.ask(self._agent, requests.Wait(*self._which), timeout_s=WAITS_S + FINDS_S)
             except TransportError:
                 silent_since = loop.time() if silent_since is None else silent_since
                 if self._launcher.replaced(self._agent) or loop.time() - silent_since > GONE_S:
@@ -199,7 +187,7 @@ class _RemotePart:
 
     def begins(self) -> None:
         """See `Launched`."""
-        self._telling = asyncio.create_task(self._launcher.ask(self._agent, Begins(*self._which), Done))
+        self._telling = asyncio.create_task(self._launcher.ask(self._agent, requests.Begins(*self._which)))
         # its end is reported by `wait`
         self._telling.add_done_callback(lambda told: told.cancelled() or told.exception())
 
@@ -208,7 +196,7 @@ class _RemotePart:
         if self._telling is not None:
             self._telling.cancel()
         with contextlib.suppress(TransportError):
-            await self._launcher.ask(self._agent, End(*self._which), Done, timeout_s=_ENDS_S)
+            await self._launcher.ask(self._agent, requests.End(*self._which), timeout_s=_ENDS_S)
 
 
 def _versions(there: AgentIs, here: AgentIs) -> str:

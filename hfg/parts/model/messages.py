@@ -4,12 +4,12 @@
     Part  -> whole    AskTime, Opened, Rest, Answer, Keep, Ended, Result, Seen, Logged, Closed
     Part  -> part     Speaks, Hears, Joins, GoesOn, Shares, Sees
 
-All of it is data of declared types (rule L4). Stands on the files of graphs and on `agreement`.
+All of it is data of declared types (rule L4). Depends on `agreement` and the trace.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias, Union
 
 import msgspec
 
@@ -42,6 +42,7 @@ from hfg.trace import (
 from hfg.transport import Buffer
 
 __all__ = [
+    "KINDS",
     "Ask",
     "AskTime",
     "Begin",
@@ -87,6 +88,20 @@ Stream: TypeAlias = Annotated[int, msgspec.Meta(ge=-1, le=2**62)]
 Label: TypeAlias = Annotated[str, msgspec.Meta(max_length=4096)]
 
 
+class Message(msgspec.Struct, frozen=True, tag=True):
+    """A message to another part."""
+
+
+class OfAnEdge(Message, frozen=True):
+    """A message between the two ends of an edge between parts.
+
+    Attributes:
+      label: label of the edge.
+    """
+
+    label: Label
+
+
 class Untrue(Exception):
     """A message of a part that is valid but cannot be true; it changed nothing.
 
@@ -112,7 +127,7 @@ class Failed(msgspec.Struct, frozen=True):
     trace: str = ""
 
 
-class Open(msgspec.Struct, frozen=True, tag=True):
+class Open(Message, frozen=True):
     """Make the part and set it up.
 
     Attributes:
@@ -136,27 +151,27 @@ class Open(msgspec.Struct, frozen=True, tag=True):
     kept: bytes | None = None
 
 
-class Opened(msgspec.Struct, frozen=True, tag=True):
+class Opened(Message, frozen=True):
     """Setup of the part's nodes has finished, or failed."""
 
     part: str
     failed: Failed | None = None
 
 
-class AskTime(msgspec.Struct, frozen=True, tag=True):
+class AskTime(Message, frozen=True):
     """Request for the time on the monotonic clock; `asked` is returned with the answer."""
 
     asked: float
 
 
-class TellTime(msgspec.Struct, frozen=True, tag=True):
+class TellTime(Message, frozen=True):
     """The answer."""
 
     asked: float
     told: float
 
 
-class Keep(msgspec.Struct, frozen=True, tag=True):
+class Keep(Message, frozen=True):
     """Request to store the state of a part.
 
     Attributes:
@@ -168,41 +183,41 @@ class Keep(msgspec.Struct, frozen=True, tag=True):
     data: bytes
 
 
-class Kept(msgspec.Struct, frozen=True, tag=True):
+class Kept(Message, frozen=True):
     """The state is stored: its consequences may be sent to others."""
 
     number: int
 
 
-class Begin(msgspec.Struct, frozen=True, tag=True):
+class Begin(Message, frozen=True):
     """All parts are set up: start."""
 
 
-class Ask(msgspec.Struct, frozen=True, tag=True):
+class Ask(Message, frozen=True):
     """Something that follows from quiet."""
 
     question: Question
 
 
-class Told(msgspec.Struct, frozen=True, tag=True):
+class Told(Message, frozen=True):
     """The answer of a part to it."""
 
     answer: Answer
 
 
-class Rests(msgspec.Struct, frozen=True, tag=True):
+class Rests(Message, frozen=True):
     """Nothing moves in a part."""
 
     rest: Rest
 
 
-class Finish(msgspec.Struct, frozen=True, tag=True):
+class Finish(Message, frozen=True):
     """The run is over."""
 
     outcome: Outcome
 
 
-class Ended(msgspec.Struct, frozen=True, tag=True):
+class Ended(Message, frozen=True):
     """The run is over in a part."""
 
     part: str
@@ -210,7 +225,7 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
     failed: Failed | None = None
 
 
-class Call(msgspec.Struct, frozen=True, tag=True):
+class Call(Message, frozen=True):
     """A request from outside to the part.
 
     Attributes:
@@ -224,7 +239,7 @@ class Call(msgspec.Struct, frozen=True, tag=True):
     arguments: dict[str, Any]
 
 
-class Result(msgspec.Struct, frozen=True, tag=True):
+class Result(Message, frozen=True):
     """The result of a call."""
 
     number: int
@@ -290,7 +305,7 @@ PlainEvent: TypeAlias = (
 Sight: TypeAlias = PlainEvent | Passed
 
 
-class Seen(msgspec.Struct, frozen=True, tag=True):
+class Seen(Message, frozen=True):
     """Observed events or tokens, in order.
 
     Attributes:
@@ -306,11 +321,11 @@ class Seen(msgspec.Struct, frozen=True, tag=True):
     count: Counted = 0
 
 
-class Close(msgspec.Struct, frozen=True, tag=True):
+class Close(Message, frozen=True):
     """Tear down, report, and go."""
 
 
-class Closed(msgspec.Struct, frozen=True, tag=True):
+class Closed(Message, frozen=True):
     """The part is torn down.
 
     Attributes:
@@ -332,41 +347,37 @@ class Closed(msgspec.Struct, frozen=True, tag=True):
     clock_within_s: float = 0.0
 
 
-class Speaks(msgspec.Struct, frozen=True, tag=True):
+class Speaks(OfAnEdge, frozen=True):
     """The producer of an edge is enabled or disabled from now on, after so many tokens."""
 
-    label: Label
     speaking: bool
     total: Counted
 
 
-class Hears(msgspec.Struct, frozen=True, tag=True):
+class Hears(OfAnEdge, frozen=True):
     """How the consumer of an edge handles tokens from now on, having taken so many."""
 
-    label: Label
     hearing: Hearing
     total: Counted
 
 
-class Reborn(msgspec.Struct, frozen=True, tag=True):
+class Reborn(Message, frozen=True):
     """A part has died and is restarted: from now on this incarnation is trusted."""
 
     part: str
     incarnation: Counted
 
 
-class Joins(msgspec.Struct, frozen=True, tag=True):
+class Joins(OfAnEdge, frozen=True):
     """Where a restarted part resumes an edge, reported by the older incarnation at the other end.
 
     Attributes:
-      label: label of the edge.
       total: from the producer: how many tokens are processed; from the consumer: how many have arrived.
       stream, number: the position of the last of them; or `UNKNOWN`.
       hearing: how the consumer handles tokens.
       ended: END was sent and has arrived; if reported by the producer, it is not included in the count.
     """
 
-    label: Label
     total: Counted
     stream: Stream
     number: Counted
@@ -374,20 +385,18 @@ class Joins(msgspec.Struct, frozen=True, tag=True):
     ended: bool = False
 
 
-class GoesOn(msgspec.Struct, frozen=True, tag=True):
+class GoesOn(OfAnEdge, frozen=True):
     """The position after which a restarted producer resumes, once it is known.
 
     Attributes:
-      label: label of the edge.
       stream, number: the position of the last processed token.
     """
 
-    label: Label
     stream: Stream
     number: Counted
 
 
-class Logged(msgspec.Struct, frozen=True, tag=True):
+class Logged(Message, frozen=True):
     """A log record of a part, for the loggers of the main program.
 
     Attributes:
@@ -409,69 +418,40 @@ class Logged(msgspec.Struct, frozen=True, tag=True):
     function: str
 
 
-class Shares(msgspec.Struct, frozen=True, tag=True):
+class Shares(OfAnEdge, frozen=True):
     """Large arrays on an edge will be in shared memory, once its consumer has opened that.
 
     Attributes:
-      label: of the edge.
       segment: what the memory is called.
       lane: the number under which this incarnation of the consumer opens it.
     """
 
-    label: str
     segment: str
     lane: int
 
 
-class Sees(msgspec.Struct, frozen=True, tag=True):
+class Sees(OfAnEdge, frozen=True):
     """The consumer of an edge has opened it.
 
     Attributes:
-      label, segment, lane: as they were offered.
+      segment, lane: as they were offered.
       refused: why it could not; "" if it has.
     """
 
-    label: str
     segment: str
     lane: int
     refused: str = ""
 
 
-OfAnEdge: TypeAlias = Speaks | Hears | Joins | GoesOn | Shares | Sees
-"""Messages between the two ends of an edge between parts."""
-
-Message: TypeAlias = (
-    Open
-    | Opened
-    | AskTime
-    | TellTime
-    | Begin
-    | Keep
-    | Kept
-    | Ask
-    | Told
-    | Rests
-    | Reborn
-    | Finish
-    | Ended
-    | Call
-    | Result
-    | Seen
-    | Logged
-    | Close
-    | Closed
-    | Speaks
-    | Hears
-    | Joins
-    | GoesOn
-    | Shares
-    | Sees
-)
-
 pack: Final = msgspec.msgpack.Encoder().encode
-"""Make bytes of a message."""
+"""Returns a message as bytes."""
 
-_decoder: Final[msgspec.msgpack.Decoder[Message]] = msgspec.msgpack.Decoder(Message)
+KINDS: Final[tuple[type[Message], ...]] = tuple(
+    kind for base in (Message, OfAnEdge) for kind in base.__subclasses__() if kind is not OfAnEdge
+)
+"""All kinds of messages."""
+
+_decoder: Final[msgspec.msgpack.Decoder[Message]] = msgspec.msgpack.Decoder(Union[KINDS])  # noqa: UP007
 
 
 def unpack(data: Buffer) -> Message | None:

@@ -23,33 +23,13 @@ from hfg.errors import EngineInternalError, HfgError
 from hfg.graph import Graph
 from hfg.graph.flat import MAIN, cut, flatten
 from hfg.graph.structure.level import level_of
+from hfg.parts.model import messages
 from hfg.parts.model.agreement import Rest
 from hfg.parts.model.clocks import Offset, RunClock, machine
 from hfg.parts.model.components import components
 from hfg.parts.model.failing import as_failed
 from hfg.parts.model.inheriting import inherited, inheriting, keeping, remembered
-from hfg.parts.model.messages import (
-    Ask,
-    AskTime,
-    Begin,
-    Call,
-    Close,
-    Closed,
-    Ended,
-    Finish,
-    Keep,
-    Kept,
-    Logged,
-    Message,
-    OfAnEdge,
-    Open,
-    Opened,
-    Reborn,
-    Rests,
-    TellTime,
-    Told,
-    Untrue,
-)
+from hfg.parts.model.messages import Message, OfAnEdge, Untrue
 from hfg.parts.model.trace_filter import trace_filter
 from hfg.parts.running.channels import Channel, called
 from hfg.parts.running.checkpointing import Checkpointer, read
@@ -87,7 +67,7 @@ class Worker:
         run: str,
         name: str,
         incarnations: tuple[int, int],
-        build: Callable[[Open], Graph],
+        build: Callable[[messages.Open], Graph],
         *,
         near: Session | None = None,
     ) -> None:
@@ -115,7 +95,7 @@ class Worker:
         try:
             while True:
                 message = self._postponed.popleft() if self._postponed else await self._inbox.get()
-                if isinstance(message, Close):
+                if isinstance(message, messages.Close):
                     await self._close()
                     return
                 try:
@@ -137,22 +117,22 @@ class Worker:
           Untrue: it makes no sense.
         """
         part = self._part
-        if isinstance(message, Open):
+        if isinstance(message, messages.Open):
             if part is not None:
                 raise Untrue("for the second time")
             await self._open(message)
-        elif isinstance(message, TellTime):
+        elif isinstance(message, messages.TellTime):
             self._told_time(message)
         elif part is None:
             raise Untrue("before there is a part")
-        elif isinstance(message, Reborn):
+        elif isinstance(message, messages.Reborn):
             await self._admit(part, message)
         elif isinstance(message, OfAnEdge):
             self._hear(part, MAIN, message)
         else:
             self._obey(part, message)
 
-    def log(self, logged: Logged) -> None:
+    def log(self, logged: messages.Logged) -> None:
         """Bring a log record to the main part; when that is slow, some are left out."""
         channel = self._channels[MAIN]
         if channel.waiting < _MOST_RECORDS:
@@ -163,7 +143,7 @@ class Worker:
 
     # --- the beginning ----------------------------------------------------------------------------------------------
 
-    async def _open(self, message: Open) -> None:
+    async def _open(self, message: messages.Open) -> None:
         try:
             self._part = part = self._make(message)
             await self._follow(part.engine, message.clock)
@@ -172,16 +152,16 @@ class Worker:
                 self._serving.obey(call)
             went_well = await part.composition.run_lifecycle.set_up()
         except HfgError as error:
-            self._say(MAIN, Opened(self._name, as_failed(error)))
+            self._say(MAIN, messages.Opened(self._name, as_failed(error)))
             return
         except Exception as error:
             problem = EngineInternalError(f"{type(error).__name__}: {error}; please report this")
             problem.__cause__ = error
-            self._say(MAIN, Opened(self._name, as_failed(problem)))
+            self._say(MAIN, messages.Opened(self._name, as_failed(problem)))
             return
-        self._say(MAIN, Opened(self._name, None if went_well else as_failed(part.engine.error)))
+        self._say(MAIN, messages.Opened(self._name, None if went_well else as_failed(part.engine.error)))
 
-    def _make(self, message: Open) -> Part:
+    def _make(self, message: messages.Open) -> Part:
         graph = self._build(message)
         flat = flatten(graph)
         cutting = cut(flat)
@@ -231,7 +211,7 @@ class Worker:
 
     def _keeper(self, composition: Composition, kept: bytes | None, keeps_states: bool) -> Checkpointer:
         def keep(number: int, data: bytes) -> None:
-            self._say(MAIN, Keep(number, data))
+            self._say(MAIN, messages.Keep(number, data))
 
         snapshot = None if kept is None else read(kept, self._name)
         keeper = Checkpointer(self._name, composition.engine, keep, snapshot, keeps_states=keeps_states)
@@ -243,7 +223,7 @@ class Worker:
         hear = partial(self._hear, part, other)
         return Channel(self._session, self._run, self._name, other, (self._incarnation, incarnation), hear)
 
-    async def _admit(self, part: Part, message: Reborn) -> None:
+    async def _admit(self, part: Part, message: messages.Reborn) -> None:
         """A neighbour has died and is restarted; messages to the one that died are lost."""
         if message.part not in self._incarnations or self._carrier is None:
             return  # not a neighbour
@@ -264,7 +244,7 @@ class Worker:
         self._offset = offset = Offset()
         while offset.heard < _ROUNDS:
             self._ask_time()
-            while not isinstance(message := await self._inbox.get(), TellTime):
+            while not isinstance(message := await self._inbox.get(), messages.TellTime):
                 self._postponed.append(message)
             offset.hear(message.asked, message.told, time.monotonic())
             self._asked = max(self._asked - 1, 0)
@@ -279,9 +259,9 @@ class Worker:
     def _ask_time(self) -> None:
         if not self._is_closed:
             self._asked += 1
-            self._say(MAIN, AskTime(time.monotonic()))
+            self._say(MAIN, messages.AskTime(time.monotonic()))
 
-    def _told_time(self, message: TellTime) -> None:
+    def _told_time(self, message: messages.TellTime) -> None:
         if self._offset is None or not self._asked:
             raise Untrue("without having been asked")
         self._asked -= 1
@@ -299,34 +279,34 @@ class Worker:
 
     def _obey(self, part: Part, message: Message) -> None:
         match message:
-            case Begin():
+            case messages.Begin():
                 if self._has_begun:
                     raise Untrue("for the second time")
                 self._has_begun = True
                 part.begin()
-            case Kept():
+            case messages.Kept():
                 part.be_kept(message.number)
-            case Ask():
+            case messages.Ask():
                 try:
                     message.question.check()
                 except msgspec.ValidationError as error:
                     raise Untrue(f"which is not such a question: {error}") from error
-                self._say(MAIN, Told(part.answer(message.question)))
-            case Finish():
+                self._say(MAIN, messages.Told(part.answer(message.question)))
+            case messages.Finish():
                 part.finish(message.outcome, None)
-            case Call():
+            case messages.Call():
                 assert self._serving is not None
                 self._serving.obey(message)
             case _:
                 raise Untrue("which is not for a part")
 
     def _rests(self, rest: Rest) -> None:
-        self._say(MAIN, Rests(rest))
+        self._say(MAIN, messages.Rests(rest))
 
     def _ended(self, part: Part) -> None:
         assert self._serving is not None
         self._serving.flush()
-        self._say(MAIN, Ended(self._name, part.engine.outcome, as_failed(part.engine.error)))
+        self._say(MAIN, messages.Ended(self._name, part.engine.outcome, as_failed(part.engine.error)))
 
     # --- the end ----------------------------------------------------------------------------------------------------
 
@@ -354,10 +334,10 @@ class Worker:
             await channel.close()
 
 
-def _closed(name: str, engine: Any, failed: Any) -> Closed:
+def _closed(name: str, engine: Any, failed: Any) -> messages.Closed:
     """Say what a part has done, now that it is torn down."""
     core = engine.core
-    return Closed(
+    return messages.Closed(
         name,
         node_reports(core),
         edge_reports(core),

@@ -23,7 +23,6 @@ from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
 from hfg.engine.observing.consumers import Listener
 from hfg.engine.observing.glance import Glance
-from hfg.engine.observing.report import EdgeReport, NodeReport
 from hfg.engine.observing.statistics import EdgeStatistics, Statistics
 from hfg.engine.observing.taps import Tap, make_tap
 from hfg.errors import NotRunning, UsageError
@@ -35,36 +34,17 @@ from hfg.nodetypes.node import Node
 from hfg.parts.model.messages import Seen
 from hfg.parts.steering.asking import Asking, Subscription
 from hfg.parts.steering.editing import CutEdits, Drawing
+from hfg.parts.steering.reports import Counts
 from hfg.ports import EventPort, ParameterPort, Port
 from hfg.trace import Consumer
 
-__all__ = ["Counts", "CutRun"]
+__all__ = ["CutRun"]
 
 T = TypeVar("T")
 
 _NO_STATISTICS: Final = EdgeStatistics(
     sent=0, dropped=0, drained=0, untaken=0, grown=0, rate_hz=0.0, deepest=0, capacity=None
 )
-
-
-class Counts(msgspec.Struct, frozen=True):
-    """The last report of a part about itself.
-
-    Attributes:
-      nodes, edges, errors, lost_activity: as in `Report`.
-      glance, statistics: if they were requested.
-      clock_within_s: maximum difference of its clock from the run's.
-      at: time of the report, on the clock of the main part.
-    """
-
-    nodes: dict[str, NodeReport]
-    edges: dict[str, EdgeReport]
-    errors: list[str]
-    lost_activity: int
-    glance: Glance | None = None
-    statistics: Statistics | None = None
-    clock_within_s: float = 0.0
-    at: float = 0.0
 
 
 class CutRun(Run):
