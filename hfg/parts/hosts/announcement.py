@@ -1,6 +1,6 @@
 """A run that all programs in a realm can find: the announcement of its main part, and its answers to requests.
 
-Depends on `realm`, and on a run's interface.
+Depends on `realm`, `requests` and a run's interface.
 """
 
 from __future__ import annotations

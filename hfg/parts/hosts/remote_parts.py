@@ -2,7 +2,7 @@
 
 Parts without a host start here, as processes that connect in the same realm. A lost connection has no immediate
 consequences; the links wait. When the agent is gone, so are its parts; they restart as soon as it is back, and until
-then the other parts wait for them as for a slow part (rules L1, L3). Depends on `realm` and `other`.
+then the other parts wait for them as for a slow part (rules L1, L3). Depends on `realm`, `requests` and `peer_process`.
 """
 
 from __future__ import annotations
