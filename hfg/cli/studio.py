@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 import webbrowser
 from pathlib import Path
 from typing import Annotated
@@ -46,6 +47,7 @@ def studio(
         from hfg.studio.serving import Server, StudioDoor
     except ImportError as error:
         raise TargetError(f'the studio needs {error.name}: pip install "hfg[studio]"') from None
+    from hfg.studio.palette import warm_up
     from hfg.studio.project import Project
     from hfg.studio.studio import Studio
 
@@ -67,6 +69,7 @@ def studio(
             insecure=insecure,
         )
         server.start()
+        threading.Thread(target=warm_up, name="hfg studio palette", daemon=True).start()
         show.write(f"{server.address}\n")
         if browser:
             webbrowser.open(server.address)

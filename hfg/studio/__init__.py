@@ -3,6 +3,7 @@
     messages     what a page and the studio say to each other      records     what a page shows, as tables of records
     describing, places   a graph as records, and its paths     tables   what has changed, as numbered patches
     following    keeps the tables as the graph and its run are     history, words   edits as people read them
+    spans        when nodes were active, and by which edges activity moves
     targets      where an edge may lead, and why not               palette     node types that words and a wire fit
     viewing      one page: its frames, its subscriptions, its credits
     topics       what pages subscribe to: activity, measures, values, timeline, log

@@ -20,10 +20,11 @@ from hfg.studio.history import Attribution
 from hfg.studio.layouts import Layouts
 from hfg.studio.project import Project
 from hfg.studio.records import ProblemRecord, ViewersRecord
+from hfg.studio.spans import Spans
 from hfg.studio.steering import Steering
 from hfg.studio.tables import Tables
 from hfg.studio.viewing import Viewer
-from hfg.trace import ErrorRaised, NodeEnabled, ParameterSet, StructureChanged, TraceEvent
+from hfg.trace import ActivityChanged, ErrorRaised, NodeEnabled, ParameterSet, StructureChanged, TraceEvent
 
 __all__ = ["Following"]
 
@@ -39,6 +40,7 @@ class Following:
       read_only: why nothing can be changed; "" if it can.
       turn: held during an edit, so that edits of pages, files and runs come one after the other.
       listeners: called with each event of the run; by topics.
+      spans: when nodes were active.
     """
 
     def __init__(self, project: Project, steering: Steering) -> None:
@@ -50,6 +52,7 @@ class Following:
         self.turn = asyncio.Lock()
         self.attribution = Attribution()
         self.listeners: set[Any] = set()
+        self.spans = Spans()
         self._layouts = Layouts(self)
         self._dirty: set[str] = set()
         self._is_stale = False
@@ -141,6 +144,14 @@ class Following:
         if self.tables.of["studio"]:
             self.tell(self.tables.replace({"studio": self._singles(), "breakpoints": self.steering.breakpoints()}))
 
+    def run_begins(self, active: Iterable[str], at: float) -> None:
+        """See `Follower`."""
+        self.spans.begin(active, at)
+
+    def run_ends(self, at: float) -> None:
+        """See `Follower`."""
+        self.spans.end(at)
+
     def run_event(self, event: TraceEvent) -> None:
         """See `Follower`."""
         match event:
@@ -154,6 +165,8 @@ class Following:
                 self.problem(problem_of_run(path, what, message, self.steering.elapsed(), self._last_edit()))
         for listener in list(self.listeners):
             listener(event)
+        if isinstance(event, ActivityChanged):  # after those who want to know who was active before
+            self.spans.change(event.node, self.steering.since_begin(event.time), active=event.active)
 
     def _last_edit(self) -> str:
         record = self.attribution.record(self.graph)

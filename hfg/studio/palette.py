@@ -29,7 +29,7 @@ from hfg.studio.refusing import Refused
 from hfg.studio.targets import Fit, end_of, fit_of
 from hfg.types import describe, why_not
 
-__all__ = ["Row", "search_types", "type_of_reference"]
+__all__ = ["Row", "search_types", "type_of_reference", "warm_up"]
 
 _LOCK: Final = threading.Lock()
 _BASES: Final = ("hfg.testing", "hfg.studio")
@@ -80,6 +80,11 @@ def _installed() -> tuple[TypeDescription, ...]:
 def _all(own: tuple[str, ...]) -> _Known:
     with _LOCK:  # two threads would import everything twice
         return _known(own)
+
+
+def warm_up() -> None:
+    """Import everything that is installed now, so that the first search is quick. Call it off the graph's loop."""
+    _all(())
 
 
 async def search_types(graph: Graph, words: str, port: str, category: str, most: int) -> dict[str, Any]:

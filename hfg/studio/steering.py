@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
@@ -36,6 +36,12 @@ class Follower(Protocol):
     def run_changed(self) -> None:
         """It is in another state, or another run."""
 
+    def run_begins(self, active: Iterable[str], at: float) -> None:
+        """There is a run now: its active nodes, and how long it has been running."""
+
+    def run_ends(self, at: float) -> None:
+        """The run is over, after so many seconds."""
+
     def run_event(self, event: TraceEvent) -> None:
         """Something has changed in it that has to do with no single token."""
 
@@ -59,6 +65,7 @@ class Steering:
         self._task: asyncio.Task[None] | None = None
         self._until_stopped: asyncio.Event | None = None
         self._listener: Any = None
+        self._offset = 0.0
         self._over = asyncio.Event()
 
     def follow(self, run: Run) -> None:
@@ -107,6 +114,8 @@ class Steering:
     def _begun(self, run: Run) -> None:
         self.run = run
         self._over = asyncio.Event()
+        self._offset = run.now() - run.elapsed()
+        self._follower.run_begins(run.active(), run.elapsed())
         self._listener = run.trace(self._event, changes_only=True)
         for path, (condition, _) in list(self._breakpoints.items()):
             with suppress(HfgError):  # there is no such place any more
@@ -121,6 +130,7 @@ class Steering:
             self._listener.remove()
             outcome = run.report().outcome
         elapsed = 0.0 if run is None else run.elapsed()
+        self._follower.run_ends(elapsed)
         self._breakpoints = {path: (condition, None) for path, (condition, _) in self._breakpoints.items()}
         error = None if failure is None else error_record(failure)
         self._say(state="ended", outcome=outcome, elapsed_s=elapsed, why="", error=error)
@@ -260,6 +270,10 @@ class Steering:
     def elapsed(self) -> float:
         """Return seconds since the run began; of a run that is over, how long it took."""
         return self._record.elapsed_s if self.run is None else self.run.elapsed()
+
+    def since_begin(self, time: float) -> float:
+        """Return seconds since the run began for a time on the run's clock."""
+        return time - self._offset
 
     def _say(self, **changed: Any) -> None:
         if self.run is not None and "elapsed_s" not in changed:

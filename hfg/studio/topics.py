@@ -25,12 +25,16 @@ from hfg.studio.logs import LogKeeper
 from hfg.studio.places import place_at
 from hfg.studio.refusing import Refused
 from hfg.studio.showing import image_frame, number_in, shown_value
+from hfg.studio.spans import Ways
 from hfg.trace import ActivityChanged, TraceEvent
 
 __all__ = ["TOPICS", "make_topic", "node_measures"]
 
 _MOST_NODES: Final = 2000
 _MOST_MOVES: Final = 256
+_NEAR: Final = 8
+"""How many changes of activity before one may be its cause."""
+
 _MOST_BOXES: Final = 4000
 _MOST_POINTS: Final = 2000
 
@@ -83,45 +87,32 @@ class _Activity(_Topic):
 
     def __init__(self, host: Following) -> None:
         super().__init__(host)
-        self._active: dict[str, float] = {}
         self._moves: deque[list[Any]] = deque(maxlen=_MOST_MOVES)
         self._count = 0
         self._is_new = True
-        self._offset = 0.0
+        self._ways = Ways({})
+        self._rev = -1
         host.listeners.add(self._event)
 
     def attach(self, run: Run) -> None:
-        self._offset = run.now() - run.elapsed()
-        self._active = dict.fromkeys(run.active(), run.elapsed())
         self._is_new = True
 
     def let_go(self) -> None:
-        self._is_new = self._is_new or bool(self._active)
-        self._active = {}
+        self._is_new = True
         self._moves.clear()
         self._count = 0
 
     def _event(self, event: TraceEvent) -> None:
         if isinstance(event, ActivityChanged):
-            at = event.time - self._offset
-            via = self._ways_to(event.node) if event.active else []
+            via: list[str] = []
             if event.active:
-                self._active[event.node] = at
-            else:
-                self._active.pop(event.node, None)
-            self._moves.append([at, event.node, event.active, event.cause, via])
+                if self._rev != self.host.tables.rev:
+                    self._rev, self._ways = self.host.tables.rev, Ways(self.host.tables.of["edges"])
+                near = {*self.host.spans.active, *(move[1] for move in list(self._moves)[-_NEAR:])}
+                via = self._ways.to(event.node, near)
+            self._moves.append([self.host.steering.since_begin(event.time), event.node, event.active, event.cause, via])
             self._count += 1
             self._is_new = True
-
-    def _ways_to(self, node: str) -> list[str]:
-        """Return the active edges by which activity may have come: from nodes that are active or just were."""
-        near = {*self._active, *(move[1] for move in list(self._moves)[-8:])}
-        edges = self.host.tables.of["edges"]
-        return [
-            key
-            for key, edge in edges.items()
-            if edge.active and edge.target.rpartition(".")[0] == node and edge.source.rpartition(".")[0] in near
-        ]
 
     def news(self) -> Any:
         if not self._is_new:
@@ -130,7 +121,7 @@ class _Activity(_Topic):
         moves, lost = list(self._moves), self._count - len(self._moves)
         self._moves.clear()
         self._count = 0
-        return {"active": dict(self._active), "moves": moves, "lost": lost}
+        return {"active": dict(self.host.spans.active), "moves": moves, "lost": lost}
 
     def close(self) -> None:
         super().close()
@@ -405,12 +396,12 @@ class _Timeline(_Sampled):
         super().__init__(host)
         self._boxes: deque[Any] = deque(maxlen=_MOST_BOXES)
         self._done = 0
-        self._offset = 0.0
+        self._is_first = True
 
     def attach(self, run: Run) -> None:
         super().attach(run)
         assert self.sampler is not None
-        self._offset = run.now() - run.elapsed()
+        self._is_first = True
         self._boxes.clear()
         self._done = self.sampler.done()
         self.sampler.note_boxes(self._boxes)
@@ -427,9 +418,11 @@ class _Timeline(_Sampled):
         done, self._done = self._done, self.sampler.done()
         rows = []
         for worker, ended, seconds in boxes:
-            end = ended - self._offset
+            end = self.host.steering.since_begin(ended)
             rows.append([worker.path, worker.group.name, end - seconds, end])
-        return {"boxes": rows, "now": self.time(), "lost": max(0, self._done - done - len(rows))}
+        first, self._is_first = self._is_first, False
+        before = {"activity": self.host.spans.rows()} if first else {}
+        return {"boxes": rows, "now": self.time(), "lost": max(0, self._done - done - len(rows)), **before}
 
 
 class _Log(_Topic):

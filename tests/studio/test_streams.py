@@ -11,7 +11,9 @@ import pytest
 
 import hfg
 from hfg.base.token import Token
+from hfg.studio.records import EdgeRecord
 from hfg.studio.showing import image_frame, shown_value
+from hfg.studio.spans import Ways
 from hfg.studio.viewing import Subscription
 from tests.studio.page import Page, live, studio_of
 from tests.studio.test_studio import doubling, ticking
@@ -372,3 +374,46 @@ def test_images_are_made_small_enough_for_the_page(shape: tuple[int, ...]) -> No
     assert struct.unpack_from("<HH", frame) == (640, 480)
     assert frame[4:6] in (b"\xff\xd8", b"\x89P")
     assert len(frame) < 20_000
+
+
+def test_the_timeline_begins_with_the_activity_so_far() -> None:
+    async def main() -> None:
+        page = Page(studio_of(lamps())).join()
+        await page.ask("start", stay=True)
+        run = page.studio.steering.run
+        assert run is not None
+        await page.ask("trigger", path="one.on", activity=1)
+        await page.ask("trigger", path="one.off")
+        await run.wait_quiet()
+        page.say(t="sub", sub=1, topic="timeline")
+        beat(page, 2)
+        first, *others = values(page, 1)
+        assert [(node, end is None) for node, _, end in first["activity"]] == [("one", False), ("other", True)]
+        assert all("activity" not in one for one in others)
+        await page.ask("stop")
+        await page.state("ended")
+        assert page.studio.spans.active == {}
+
+    live(main)
+
+
+# --- where activity comes from ---
+
+
+def edge(source: str, target: str) -> EdgeRecord:
+    return EdgeRecord(source, target, "", True, {}, True, False)
+
+
+def test_activity_that_moves_between_subgraphs_comes_by_the_edges_of_all_levels() -> None:
+    ways = Ways(
+        {
+            "out": edge("a/x.done", "a.done.inner"),
+            "over": edge("a.done", "b.begin"),
+            "in": edge("b.begin.inner", "b/y.begin"),
+            "other": edge("c.done", "b.begin"),
+            "within": edge("b/y.done", "b/z.begin"),
+        }
+    )
+    assert ways.to("b/y", ["a/x", "b/y"]) == ["in", "over"]
+    assert ways.to("b/z", ["b/y", "a/x"]) == ["within"]
+    assert ways.to("b/y", ["c"]) == ["in", "other"]
