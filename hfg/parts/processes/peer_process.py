@@ -1,6 +1,6 @@
 """Another part of a run, as seen from the main part: its process, whether it is there, and its final report.
 
-A `Launcher` starts processes, here or on other hosts. Depends on `channels` and `incarnations`.
+A `Launcher` starts processes, here or on other hosts. Depends on `channels` and `deaths`.
 """
 
 from __future__ import annotations
