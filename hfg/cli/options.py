@@ -1,13 +1,18 @@
-"""Arguments and options that several verbs have. Stands on typer and `completing`."""
+"""Arguments and options that several verbs have; those of a run follow from their declaration."""
 
 from __future__ import annotations
 
+import functools
+import inspect
+from collections.abc import Callable
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
 from hfg.cli import completing
+from hfg.graph.structure.option import declared
+from hfg.graph.structure.options import RunFields
 
 __all__ = [
     "AllowOption",
@@ -20,6 +25,7 @@ __all__ = [
     "TargetArgument",
     "UntilOption",
     "VerboseOption",
+    "with_run_options",
 ]
 
 
@@ -79,3 +85,28 @@ DebugOption = Annotated[
 VerboseOption = Annotated[
     int, typer.Option("-v", "--verbose", count=True, help="Report each node; with -vv, each edge.")
 ]
+
+
+def with_run_options(verb: Callable[..., int]) -> Callable[..., int]:
+    """Give a verb the flags that options of a run declare; it receives them by name, in `**options`."""
+    signature = inspect.signature(verb)
+    hints = get_type_hints(verb, include_extras=True)
+    own = [one.replace(annotation=hints[one.name]) for one in signature.parameters.values() if one.name != "options"]
+    flags = [
+        inspect.Parameter(
+            one.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=one.default,
+            annotation=Annotated[one.type, typer.Option(one.option.flag, help=one.option.says.replace("`", ""))],
+        )
+        for one in declared(RunFields).values()
+        if one.option.flag
+    ]
+
+    @functools.wraps(verb)
+    def run(*arguments: Any, **named: Any) -> int:
+        return verb(*arguments, **named)
+
+    run.__dict__["__signature__"] = signature.replace(parameters=[*own, *flags])
+    run.__annotations__ = {one.name: one.annotation for one in (*own, *flags)} | {"return": int}
+    return run

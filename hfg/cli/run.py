@@ -31,6 +31,7 @@ from hfg.cli.options import (
     TargetArgument,
     UntilOption,
     VerboseOption,
+    with_run_options,
 )
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
@@ -48,6 +49,7 @@ __all__ = ["run"]
 _TRACES: Final = ("", ".jsonl", ".json")
 
 
+@with_run_options
 def run(
     target: TargetArgument,
     clock: ClockOption = Clock.real,
@@ -56,8 +58,6 @@ def run(
     arg: ArgOption = None,
     allow: AllowOption = None,
     settings: SettingsOption = None,
-    policy: Annotated[str | None, typer.Option(help="Which node runs next: fifo, priority, random ...")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed for --policy random.")] = None,
     trace: Annotated[
         Path | None,
         typer.Option(
@@ -80,6 +80,7 @@ def run(
     ] = False,
     debug: DebugOption = False,
     verbose: VerboseOption = 0,
+    **options: Any,  # those that declare a flag
 ) -> int:
     """Run a graph. Ctrl-C stops it; a second Ctrl-C stops it immediately."""
     show.set_debug(debug)
@@ -114,10 +115,9 @@ def run(
             begin,
             until_s=until,
             debug=debug,
-            policy=policy,
-            seed=seed,
             trace=write,
             settings=settings,
+            **options,
         )
     for page in pages:
         if page.error is not None:

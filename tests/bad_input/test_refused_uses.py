@@ -553,7 +553,7 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "disconnect no edge": (edited(commands.Disconnect("numbers.out", "count.value")), "graph.edges lists those that t"),
     "rename into a path": (edited(commands.Rename("count", "a/b")), '"/" separates the parts of a path; use "a_b"'),
-    "rename to another": (edited(commands.Rename("count", "inc")), 'has a node "inc" already; choose another name'),
+    "rename to another": (edited(commands.Rename("count", "inc")), 'already has a node "inc"; choose another name'),
     "undo at rest": (lambda: build().undo(), "nothing to undo: nothing was edited by commands yet"),
     "redo at rest": (lambda: build().redo(), "nothing to redo: nothing was undone since the last edit"),
     "no such path": (lambda: build()["nobody"], NO_NODE),

@@ -14,6 +14,7 @@ import pytest
 import hfg
 from hfg.graph import EdgeGiven, EdgeOptions, GroupGiven, GroupSpec, NodeGiven, NodeOptions
 from hfg.graph.structure.option import declared
+from hfg.graph.structure.options import RunFields, RunGiven
 from tests.support import one_more_option, option_tables
 
 ALL = [2.5, 3, 7]
@@ -31,8 +32,9 @@ ENDS = {
     "cut into processes": [[2.5, 2.5], True, True, True],
     "drawn": [True] * 6,
     "in the schema": ["Its share of the processor.", 1, 0, True],
-    "in the docs": [_ROW, True],
-    "run": ["done", 3],
+    "in the docs": [_ROW, True, True],
+    "run": ["done", 3, 5, 5],
+    "on the command line": [1, True],
 }
 
 
@@ -64,6 +66,7 @@ def test_an_option_that_is_only_declared_is_refused_where_it_cannot_be(found: di
         '"twice.out" -> "begin.activate": max_age_s=2.5 is for edges from events, "twice.out" is an output',
         'node "more": weight must be a whole number from 1 on, got 0',
         'subgraph "box": it does not fire itself, so weight means nothing',
+        "lap must be a whole number from 1 on, got 0",
     ]
     for sentence, beginning in zip(found["refused"], beginnings, strict=True):
         assert sentence.startswith(beginning)
@@ -74,7 +77,8 @@ def test_no_path_is_left_out(found: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "kind"), [(EdgeGiven, EdgeOptions), (NodeGiven, NodeOptions), (GroupGiven, GroupSpec)]
+    ("given", "kind"),
+    [(EdgeGiven, EdgeOptions), (NodeGiven, NodeOptions), (GroupGiven, GroupSpec), (RunGiven, RunFields)],
 )
 def test_type_checkers_know_the_options_that_are_declared(given: Any, kind: Any) -> None:
     assert list(given.__annotations__) == list(declared(kind))

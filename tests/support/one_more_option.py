@@ -1,6 +1,6 @@
 """What becomes of options that hfg does not have: run as a program, it prints what each path makes of them, as JSON.
 
-It lets `hfg/graph/structure/options.py` declare one more option of an edge, of a node and of a group, before anything
+It lets `hfg/graph/structure/options.py` declare one more option of an edge, a node, a group and a run, before anything
 imports it. Nothing else is changed.
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.machinery
 import importlib.util
+import inspect
 import json
 import sys
 import tempfile
@@ -30,6 +31,10 @@ DECLARED = (
     (
         "class GroupFields(Fields[GroupGiven], kw_only=True):\n",
         "    nice: Annotated[int, Option('As of ours.', least=0)] = 0\n",
+    ),
+    (
+        "class RunFields(Fields[RunGiven], kw_only=True):\n",
+        "    lap: Annotated[int, Option('Its number.', least=1, flag='--lap', everywhere=True)] = 1\n",
     ),
 )
 
@@ -57,6 +62,7 @@ if __name__ == "__main__":
     sys.meta_path.insert(0, _Finder())
 
 import hfg  # noqa: E402 - with what is declared above
+from hfg.cli import run as cli  # noqa: E402
 from hfg.errors import HfgError  # noqa: E402
 from hfg.files import schema, text_of  # noqa: E402
 from hfg.files.describing import describe  # noqa: E402
@@ -160,7 +166,8 @@ def _schema() -> Any:
 
 def _documented() -> Any:
     row = next(line for line in table(options.EdgeOptions).splitlines() if "max_age_s" in line)
-    return [row, "max_age_s: No signal waits longer." in (options.EdgeOptions.__doc__ or "")]
+    documented = [hfg.run.__doc__ or "", options.EdgeOptions.__doc__ or ""]
+    return [row, "lap: Its number." in documented[0], "max_age_s: No signal waits longer." in documented[1]]
 
 
 def _refused() -> Any:
@@ -169,6 +176,7 @@ def _refused() -> Any:
         lambda: graph().connect("twice.out", "begin.activate", **OF_EDGE),
         lambda: graph().edit(commands.Add(TWICE, "more", {}, {"weight": 0})),
         lambda: graph().add(hfg.Subgraph(), name="box", **OF_NODE),
+        lambda: hfg.run(graph(), lap=0),  # type: ignore[call-arg]
     ]
     return [_refusal(one) for one in wrong]
 
@@ -182,8 +190,16 @@ def _refusal(call: Callable[[], object]) -> str:
 
 
 def _run() -> Any:
-    report = hfg.run(graph(), clock="virtual")
-    return [report.outcome, report.nodes["end"].processed]
+    """The option of a run, in the settings that the engine and other processes have."""
+    found: list[Any] = []
+    option: Any = {"lap": 5}
+    report = hfg.run(graph(), clock="virtual", begin=lambda run: found.append(run._engine.settings), **option)
+    return [report.outcome, report.nodes["end"].processed, found[0].lap, found[0].everywhere()["lap"]]
+
+
+def _on_the_command_line() -> Any:
+    flags = inspect.signature(cli.run).parameters
+    return [flags["lap"].default, "--lap" in str(vars(flags["lap"].annotation.__metadata__[0]))]
 
 
 PATHS: dict[str, Callable[[], Any]] = {
@@ -199,6 +215,7 @@ PATHS: dict[str, Callable[[], Any]] = {
     "in the docs": _documented,
     "refused": _refused,
     "run": _run,
+    "on the command line": _on_the_command_line,
 }
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from hfg.graph import EdgeOptions, GroupSpec, NodeOptions
 from hfg.graph.structure.option import Fields, declared
+from hfg.graph.structure.options import RunFields
 
 PAGE: Final = Path(__file__).parents[2] / "docs" / "reference.md"
 _ONLY: Final = {
@@ -18,7 +19,12 @@ _ONLY: Final = {
     "any": "",
     "subgraph": "Only for subgraphs.",
 }
-KINDS: Final[dict[str, type[Fields[Any]]]] = {"an edge": EdgeOptions, "a node": NodeOptions, "a group": GroupSpec}
+KINDS: Final[dict[str, type[Fields[Any]]]] = {
+    "an edge": EdgeOptions,
+    "a node": NodeOptions,
+    "a group": GroupSpec,
+    "a run": RunFields,
+}
 
 
 def table(kind: type[Fields[Any]]) -> str:

@@ -23,7 +23,7 @@ from hfg.engine.face.run import Run
 from hfg.engine.face.watching import watched
 from hfg.engine.observing.report import Report
 from hfg.engine.runtime.interrupt import CtrlC
-from hfg.engine.runtime.settings import RunOptions, Settings
+from hfg.engine.runtime.settings import Settings
 from hfg.errors import CheckFailed, GraphError, HfgError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.checks import check_flat
@@ -31,6 +31,8 @@ from hfg.graph.checks.endless import endless
 from hfg.graph.flat import FlatGraph, flatten
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
+from hfg.graph.structure.option import declared, explaining
+from hfg.graph.structure.options import RunFields, RunGiven
 
 __all__ = ["run", "run_async", "running"]
 
@@ -57,9 +59,9 @@ def _no_graph(found: object) -> UsageError:
     return UsageError(f"a Graph can run, not {type(found).__name__}: write {how}")
 
 
-def _settings(options: RunOptions, *, allow_idle: bool = False) -> Settings:
-    for name in options.keys() - RunOptions.__annotations__.keys():
-        raise TypeError(f'a run has no option "{name}"; {suggest(name, RunOptions.__annotations__)}')
+def _settings(options: RunGiven, *, allow_idle: bool = False) -> Settings:
+    for name in options.keys() - declared(RunFields).keys():
+        raise TypeError(f'a run has no option "{name}"; {suggest(name, declared(RunFields))}')
     return Settings(allow_idle=allow_idle, **options)
 
 
@@ -89,8 +91,7 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
         _refuse_endless(flat)
     others = None
     if settings.settings is not None or any(group.process for group in flat.groups.values()):
-        said = {name: getattr(settings, name) for name in ("debug", "policy", "seed", "fast", "block_warning_s")}
-        others = hooks.distribute(graph, flat, said, is_virtual, settings.settings)
+        others = hooks.distribute(graph, flat, settings.everywhere(), is_virtual, settings.settings)
     parts = Composition(flat if others is None else others.flat, settings, others)
     run: Run = Run(graph, parts) if others is None else others.face(graph)
     level.whole.begin_run(run)
@@ -171,7 +172,7 @@ async def _run_to_end(
         ctrl_c.task, ctrl_c.run_lifecycle = asyncio.current_task(), run_lifecycle
         ctrl_c.error = lambda: engine.error
     try:
-        async with watched(run, settings.watch):
+        async with watched(run, settings.watch or False):
             try:
                 for worker in engine.core.readers:
                     outside.collect(engine, worker, parts.outputs.setdefault(worker.port_name, []))
@@ -192,13 +193,14 @@ async def _run_to_end(
     return parts.report()
 
 
+@explaining(RunFields)
 async def run_async(
     graph: Graph,
     *,
     clock: Clock | None = None,
     begin: Callable[[Run], object] | None = None,
     allow_idle: bool = False,
-    **options: Unpack[RunOptions],
+    **options: Unpack[RunGiven],
 ) -> Report:
     """Run a graph to its end in the running event loop.
 
@@ -209,8 +211,7 @@ async def run_async(
       clock: "real" or "virtual"; "virtual" needs a loop in virtual time, `VirtualTimeLoop`.
       begin: called with the run before nodes are set up; see `run`.
       allow_idle: keep a quiet graph running; see `run`.
-      **options: `until_s`, `debug`, `policy`, `seed`, `trace`, `block_warning_s`, `fast`, `watch` and `settings`, as in
-        `run`.
+      **options: `until_s`, `debug`, `policy`, `trace` and so on; docs/reference.md lists all options of a run.
 
     Returns:
       A report; its `outcome` is "done", "stopped" or "until".
@@ -224,13 +225,14 @@ async def run_async(
     return await _run_to_end(graph, clock or "real", settings, begin)
 
 
+@explaining(RunFields)
 def run(
     graph: Graph,
     *,
     clock: Clock = "real",
     begin: Callable[[Run], object] | None = None,
     allow_idle: bool = False,
-    **options: Unpack[RunOptions],
+    **options: Unpack[RunGiven],
 ) -> Report:
     """Run a graph to its end. Blocks until the run is over.
 
@@ -238,19 +240,9 @@ def run(
       graph: the graph. It is checked first. A graph can have one run at a time; each run starts from scratch.
       clock: "real" or "virtual". Virtual time runs as fast as the machine can and gives the same values and stamps
         every time (R6).
-      until_s: end the run after this many seconds on its clock.
-      debug: check every value against its port's type, and detect nodes that modify a shared value (T1).
-      policy: scheduling policy of all groups, instead of their own: "fifo", "priority", "deadline", "fair" or "random"
-        (R2).
-      seed: seed of the policy "random", and of the jitter of retries.
-      trace: receives every event of the run (R7): a list, a function, or another consumer. It is removed if it raises.
       begin: called with the run, on its loop, before nodes are set up. Use it for `run.tap` and `run.trace`.
       allow_idle: keep a quiet graph running. It then waits for subscribers, `stop` or Ctrl-C.
-      block_warning_s: warn about a firing that blocks the event loop for longer than this; 0 never warns.
-      fast: fuse plain nodes and use fast paths. Results are the same without it.
-      watch: let `hfg top` and `hfg tap` in other processes of the same user watch the run, on the real clock. A string
-        is the name that they show for the program. Default: whether the environment has HFG_WATCH=1.
-      settings: file with the settings of the network: where agents are found, and who else may watch the run.
+      **options: `until_s`, `debug`, `policy`, `trace` and so on; docs/reference.md lists all options of a run.
 
     Returns:
       A report; its `outcome` is "done", "stopped" or "until".
@@ -316,11 +308,12 @@ class _Block(AbstractAsyncContextManager[Run]):
             )
 
 
+@explaining(RunFields)
 def running(
     graph: Graph,
     *,
     clock: Clock | None = None,
-    **options: Unpack[RunOptions],
+    **options: Unpack[RunGiven],
 ) -> AbstractAsyncContextManager[Run]:
     """Run a graph for as long as an `async with` block lasts.
 
@@ -331,8 +324,7 @@ def running(
     Args:
       graph: the graph; it is checked first.
       clock: "real" or "virtual"; "virtual" needs a loop in virtual time, `VirtualTimeLoop`.
-      **options: `until_s`, `debug`, `policy`, `seed`, `trace`, `block_warning_s`, `fast`, `watch` and `settings`, as in
-        `run`.
+      **options: `until_s`, `debug`, `policy`, `trace` and so on; docs/reference.md lists all options of a run.
 
     Returns:
       A context manager whose value is the `Run`.
@@ -346,14 +338,14 @@ def running(
 
 
 @asynccontextmanager
-async def _running(graph: Graph, clock: Clock | None, options: RunOptions) -> AsyncIterator[Run]:
+async def _running(graph: Graph, clock: Clock | None, options: RunGiven) -> AsyncIterator[Run]:
     settings = _settings(options)
     run, parts = _prepare(graph, clock or "real", settings)
     engine = parts.engine
     guard = _Guard(parts)
     try:
         parts.stay_open()
-        async with watched(run, settings.watch):
+        async with watched(run, settings.watch or False):
             await parts.start()
             if engine.error is None:
                 guard.begin(graph.name)

@@ -1,102 +1,66 @@
-"""How a run is to be done: the options of `hfg.run`, in one place. Stands on `trace` and `errors`."""
+"""How a run is done: its options, which `hfg.graph.structure.options` declares, and what else holds for each run."""
 
 from __future__ import annotations
 
 import os
-from pathlib import Path
-from typing import TypedDict
+
+import msgspec
 
 from hfg.errors import UsageError
-from hfg.trace import Consumer
+from hfg.graph.structure.option import declared, refuse_values
+from hfg.graph.structure.options import RunFields
 
-__all__ = ["CHECK_ALL", "FUSE_AFTER", "RunOptions", "Settings"]
+__all__ = ["CHECK_ALL", "FUSE_AFTER", "Settings"]
 
 CHECK_ALL = False
-"""Whether runs ask after every step for the invariants of all their nodes and edges; the tests of the semantics do."""
+"""Whether runs check the invariants of all their nodes and edges after every step; the tests of the semantics do."""
 
 FUSE_AFTER = 25
-"""Firings of a head before its region is fused: forming one costs what so many interpreted ones do, 0.2 ms a node."""
+"""Firings of a head before its region is fused: forming one costs as much as 25 interpreted ones, 0.2 ms per node."""
 
 
-class RunOptions(TypedDict, total=False):
-    """What may be said of any run, and left out; `hfg.run` tells what it means."""
+class Settings(RunFields, kw_only=True):
+    """How a run is done: its options, checked, and what else holds for each run.
 
-    until_s: float | None
-    debug: bool
-    policy: str | None
-    seed: int | None
-    trace: Consumer | None
-    block_warning_s: float
-    fast: bool
-    watch: bool | str | None
-    settings: str | Path | None
-
-
-class Settings:
-    """How a run is to be done: its options, checked, and what else holds of each run.
+    Attributes:
+      allow_idle: a quiet graph keeps running.
+      watch_said: `watch` was given, and does not come from the environment.
+      check_all: see `CHECK_ALL`.
+      fuse_after: see `FUSE_AFTER`.
+      teardown_limit_s: how long a teardown may take (X3).
 
     Raises:
-      UsageError: one of them cannot be.
+      UsageError: a value is not allowed.
     """
 
-    def __init__(
-        self,
-        *,
-        debug: bool = False,
-        policy: str | None = None,
-        seed: int | None = None,
-        trace: Consumer | None = None,
-        fast: bool = True,
-        until_s: float | None = None,
-        allow_idle: bool = False,
-        block_warning_s: float = 0.1,
-        watch: bool | str | None = None,
-        settings: str | Path | None = None,
-    ) -> None:
-        if until_s is not None and not _seconds(until_s):
-            raise UsageError(f"until_s must be seconds from 0 on, or None for no end, got {until_s!r}")
-        if not _seconds(block_warning_s):
-            raise UsageError(f"block_warning_s must be seconds, or 0 for never, got {block_warning_s!r}")
-        for name, value in (("debug", debug), ("fast", fast), ("allow_idle", allow_idle)):
-            if not isinstance(value, bool):
-                raise UsageError(f"{name} must be True or False, got {value!r}")
-        if seed is not None and type(seed) is not int:
-            raise UsageError(f"seed must be a whole number, got {seed!r}")
-        if not _may_be_watched(watch):
-            raise UsageError(f"watch must be True or False, or what hfg top shows as the program, got {watch!r}")
-        if settings is not None and not isinstance(settings, str | Path):
-            raise UsageError(f'settings must be the file of a realm, as in settings="cell.toml", got {settings!r:.80}')
-        self.debug = debug
-        self.check_all = CHECK_ALL
-        self.policy = policy
-        self.seed = seed
-        self.trace = trace
-        self.fast = fast
-        self.fuse_after = FUSE_AFTER
-        self.until_s = until_s
-        self.allow_idle = allow_idle
-        self.block_warning_s = block_warning_s
-        self.watch = _watch_asked() if watch is None else watch
-        self.watch_said = watch is not None
-        self.settings = None if settings is None else str(settings)
-        self.teardown_limit_s = 5.0  # X3
+    allow_idle: bool = False
+    watch_said: bool = False
+    check_all: bool = msgspec.field(default_factory=lambda: CHECK_ALL)
+    fuse_after: int = msgspec.field(default_factory=lambda: FUSE_AFTER)
+    teardown_limit_s: float = 5.0
 
+    def __post_init__(self) -> None:
+        refuse_values(Settings, "", {name: getattr(self, name) for name in declared(Settings)}, UsageError)
+        if not isinstance(self.allow_idle, bool):
+            raise UsageError(f"allow_idle must be True or False, got {self.allow_idle!r}")
+        self.watch_said = self.watch is not None
+        if self.watch is None:
+            self.watch = _watch_asked()
+        if self.settings is not None:
+            self.settings = str(self.settings)
 
-def _may_be_watched(watch: object) -> bool:
-    return watch is None or isinstance(watch, bool) or (isinstance(watch, str) and watch != "")
+    def everywhere(self) -> dict[str, object]:
+        """Return the options that the other processes of the run have, too."""
+        return {name: getattr(self, name) for name, one in declared(RunFields).items() if one.option.everywhere}
 
 
 def _watch_asked() -> bool:
-    """Whether the environment asks for runs that other processes can look at.
+    """Return whether the environment asks for runs that other processes can watch.
 
     Raises:
-      UsageError: nobody knows what it asks for.
+      UsageError: its value means nothing.
     """
     asked = os.environ.get("HFG_WATCH", "")
     if asked not in ("", "0", "1"):
-        raise UsageError(f'HFG_WATCH is "{asked}": set it to 1, so that hfg top can look at runs, or to 0')
+        raise UsageError(f'HFG_WATCH is "{asked}": set it to 1, so that hfg top can watch runs, or to 0')
     return asked == "1"
-
-
-def _seconds(value: object) -> bool:
-    return isinstance(value, int | float) and value >= 0

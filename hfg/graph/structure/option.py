@@ -26,6 +26,7 @@ __all__ = [
     "add_unset",
     "declared",
     "documented",
+    "explaining",
     "given",
     "having",
     "refuse_values",
@@ -57,6 +58,8 @@ class Option:
       badge: what a drawing shows of it, with the value in place of {}, or a function of the value; "" is nothing.
       rank: of the badge among others, the smallest first.
       usual: what its default is, where that depends on others.
+      flag: for a run, its flag on the command line; "" if it has none.
+      everywhere: for a run, whether each of its processes has the option, too.
     """
 
     says: str
@@ -71,6 +74,8 @@ class Option:
     badge: str | Callable[[Any], str] = ""
     rank: int = 0
     usual: str = ""
+    flag: str = ""
+    everywhere: bool = False
 
 
 @dataclass(frozen=True)
@@ -123,7 +128,7 @@ class Declared:
         if kind in (int, float):
             is_number = type(value) is int or (kind is float and isinstance(value, float))
             return is_number and value == value and self._is_within(value)  # NaN is not a number
-        return type(value) is kind and value != ""
+        return kind is Any or (isinstance(kind, type) and isinstance(value, kind) and value != "")
 
     def _is_within(self, value: float) -> bool:
         option = self.option
@@ -163,6 +168,7 @@ class Fields(msgspec.Struct, Generic[G]):
 
 
 K = TypeVar("K", bound=Fields[Any])
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 @functools.cache
@@ -198,13 +204,14 @@ def refuse_values(kind: type[Fields[Any]], where: str, said: Mapping[str, Any], 
     """Refuse values that options cannot have.
 
     Raises:
-      HfgError: `error`, with a message that begins with `where`.
+      HfgError: `error`, with a message that begins with `where`, if that is not empty.
     """
     for name, value in said.items():
         one = declared(kind)[name]
         if not isinstance(one.default, tuple) and not one.fits(value):
             remedy = f"; {one.option.remedy}" if one.option.remedy else ""
-            raise error(f"{where}: {name} must be {one.expects}, got {value!r}{remedy}")
+            at = f"{where}: " if where else ""
+            raise error(f"{at}{name} must be {one.expects}, got {value!r:.80}{remedy}")
 
 
 def add_unset(kind: type[Fields[Any]], body: dict[str, Any], *, none: bool = False) -> None:
@@ -224,6 +231,24 @@ def documented(kind: type[K]) -> type[K]:
     lines = [f"  {one.name}: {one.option.says}" for one in declared(kind).values()]
     kind.__doc__ = "\n".join([(kind.__doc__ or "").rstrip(), "", "Attributes:", *lines])
     return kind
+
+
+def explaining(kind: type[Fields[Any]]) -> Callable[[F], F]:
+    """Make a decorator that replaces `**options` in the docstring of a function by what the options mean."""
+
+    def explain(function: F) -> F:
+        lines = (function.__doc__ or "").splitlines()
+        number = next((number for number, line in enumerate(lines) if line.lstrip().startswith("**options:")), None)
+        if number is not None:
+            indent = lines[number][: -len(lines[number].lstrip())]
+            end = number + 1
+            while lines[end].startswith(f"{indent} "):
+                end += 1
+            lines[number:end] = [f"{indent}{one.name}: {one.option.says}" for one in declared(kind).values()]
+            function.__doc__ = "\n".join(lines)
+        return function
+
+    return explain
 
 
 def written(name: str, value: object) -> str:
