@@ -30,6 +30,13 @@ def draw(
     ports: Annotated[
         Literal["used", "all"], typer.Option(help="Ports to show in an SVG: those with edges, or all.")
     ] = "used",
+    view: Annotated[
+        Literal["activity", "mission", "all"] | None,
+        typer.Option(
+            help="What an SVG shows: states and what feeds them, all with data in bundles, or each edge by itself. "
+            "Default: mission if activity moves between nodes, else all."
+        ),
+    ] = None,
     arg: ArgOption = None,
     allow: AllowOption = None,
     format: Annotated[  # noqa: A002 - the word users know
@@ -42,7 +49,7 @@ def draw(
     show.set_debug(debug)
     graph = load_graph(target, arg or [], allow)
     try:
-        text = graph.draw(out, depth=depth, fold=fold or (), active=active, ports=ports, format=format)
+        text = graph.draw(out, depth=depth, fold=fold or (), active=active, ports=ports, view=view, format=format)
     except (GraphError, UsageError) as error:
         show.sentence(str(error))
         return 2

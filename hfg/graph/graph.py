@@ -327,13 +327,14 @@ class Graph:
         fold: Iterable[Node | str] = (),
         active: Iterable[Node | str] | None = None,
         ports: Literal["used", "all"] = "used",
+        view: Literal["activity", "mission", "all"] | None = None,
         format: Literal["svg", "mmd", "dot"] | None = None,  # noqa: A002 - the word users know
     ) -> str:
         """Draw the graph and return the drawing as text. Notebooks show a graph without this.
 
         An SVG uses the notation of the paper: inputs left, outputs right, slots on top, events at the bottom; dark
-        squares are synchronous, light circles asynchronous, double lines active edges. Nodes that are active in a run
-        have a thick border.
+        squares are synchronous, light circles asynchronous, double lines active edges. Activity flows from top to
+        bottom, data from left to right. Nodes that are active in a run have an orange border.
 
         Args:
           path: the file to write; its name ends in ".svg", ".mmd" (Mermaid) or ".dot" (Graphviz). By default no file is
@@ -343,6 +344,8 @@ class Graph:
           active: the nodes and subgraphs to show as active, as `run.active()` returns them. Default: those that are
             active now.
           ports: "all" also shows ports without an edge.
+          view: of an SVG, "activity" shows the states and what feeds them, "mission" all edges with data in bundles,
+            "all" each edge by itself. Default: "mission" if activity moves between nodes, else "all".
           format: "svg", "mmd" or "dot", regardless of the file's name. Default without a file: Mermaid.
 
         Returns:
@@ -354,7 +357,7 @@ class Graph:
         """
         from hfg.graph.drawing.formats import draw, view_of  # here, for most programs draw nothing
 
-        return draw(self, path, format=format, view=view_of(self, depth, fold, active, ports))
+        return draw(self, path, format=format, view=view_of(self, depth, fold, active, ports, view))
 
     # --- editing ---
 

@@ -17,7 +17,7 @@ import msgspec
 from hfg.engine import Report, Statistics
 from hfg.errors import HfgError
 from hfg.graph import Graph
-from hfg.graph.drawing.picture import Shape, picture
+from hfg.graph.drawing.picture import picture
 from hfg.graph.drawing.text import escaped
 from hfg.reporting.observing import MOST_NODES, SPANS, Observed
 from hfg.reporting.pictures import png
@@ -33,7 +33,7 @@ _RULES: Final = (
 
 def drawing(graph: Graph) -> tuple[str, str]:
     """Draw a graph for a page, with no node active. Return the drawing, and what it leaves out, if anything."""
-    nodes = [one for _, one in picture(graph).items if isinstance(one, Shape) and one.look == "node"]
+    nodes = [one for _, one in picture(graph).items if one.look == "node"]
     if len(nodes) <= _MOST_DRAWN:
         return graph.draw(format="svg", active=()), ""
     top = sum(1 for _ in graph.nodes)

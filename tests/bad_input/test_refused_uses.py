@@ -610,7 +610,10 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "draw some ports": (lambda: build().draw(ports="some"), 'ports= is "used", those that edges lead to, or "all", g'),  # type: ignore[arg-type]
     "fold a text": (lambda: build().draw(fold="count"), 'fold= takes a list of nodes or paths, as in fold=["fetch"]'),
     "fold nobody": (lambda: build().draw(fold=["nobody"]), NO_NODE),
-    "fold a node": (lambda: build().draw(fold=["count"]), '"count" cannot be folded, for it is no subgraph; leave it'),
+    "fold a node": (
+        lambda: build().draw(fold=["count"]),
+        '"count" cannot be folded, because it is not a subgraph; leave it',
+    ),
     "show 3 as active": (lambda: build().draw(active=[3]), "active= takes its nodes or their paths, got 3; add it fir"),  # type: ignore[list-item]
     "show a stranger": (lambda: build().draw(active=[inc()]), "active= takes its nodes or their paths, got <inc()>; a"),
     "draw a number": (lambda: build().draw(3), 'is drawn into a file, as in graph.draw("gra'),  # type: ignore[arg-type]
@@ -753,7 +756,7 @@ LINES = {
     "draw steps.py x": 'graph "steps" cannot be drawn into "x": a drawing ends in .svg or .mmd or .dot; rename',
     "draw steps.py --format pdf": "Invalid value for '--format': 'pdf' is not one of 'svg', 'mmd', 'dot'",
     "draw steps.py --fold nobody": 'graph "steps" has no node "nobody"',
-    "draw steps.py --fold third": '"third" cannot be folded, for it is no subgraph; leave it out of fold=',
+    "draw steps.py --fold third": '"third" cannot be folded, because it is not a subgraph; leave it out of fold=',
     "draw steps.py --depth -1": "depth= says how many subgraphs inside each other are shown open, 0 or more, got -1",
     "draw steps.py --ports some": "Invalid value for '--ports': 'some' is not one of 'used', 'all'",
     "draw missing.py": "missing.py: does not exist",

@@ -420,10 +420,10 @@ def test_draw_makes_an_svg_of_a_target_with_what_is_asked_for(hfg: Command, tmp_
     assert hfg("draw", TARGET, "halves.svg").code == 0
     text = (tmp_path / "halves.svg").read_text(encoding="utf-8")
     assert hfg("draw", TARGET, "--format", "svg").out == text
-    assert 'class="hfg-node hfg-on"' not in text
+    assert 'class="hfg-body hfg-on"' not in text
     name = text.partition('data-path="')[2].partition('"')[0]
     shown = hfg("draw", TARGET, "--format", "svg", "--active", name, "--depth", "0", "--ports", "all")
-    assert 'class="hfg-node hfg-on"' in shown.out
+    assert 'class="hfg-body hfg-on"' in shown.out
 
 
 def test_check_tells_everything_that_is_wrong_with_a_machine(hfg: Command, tmp_path: Path) -> None:

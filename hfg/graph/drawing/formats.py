@@ -1,7 +1,7 @@
 """Draws graphs as text: SVG to look at, Mermaid for pages, DOT for Graphviz.
 
 In Mermaid and DOT active edges are thick or double, edges from events are dashed, subgraphs are boxes; states are
-tinted, those that are active in a run have a thick border. Stands on `picture` and `svg`.
+tinted, those that are active in a run have a thick border. Depends on `picture` and `svg`.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, cast, get_args
 
 from hfg.base.controls import escaped
 from hfg.base.whole import write_whole
 from hfg.errors import GraphError, UsageError
-from hfg.graph.drawing.picture import EVERYTHING, Arrow, Box, Look, Picture, Shape, View, picture
+from hfg.graph.drawing.picture import EVERYTHING, Arrow, Kind, Picture, Shape, View, picture
 from hfg.graph.drawing.svg import svg
 from hfg.graph.structure.level import HasLevel, Level, level_of
 from hfg.graph.structure.pointing import meant, node_at
@@ -64,8 +64,9 @@ def view_of(
     fold: Iterable[Node | str],
     active: Iterable[Node | str] | None,
     ports: str,
+    kind: str | None = None,
 ) -> View:
-    """Check what somebody wants to see.
+    """Check what the user wants to see.
 
     Raises:
       GraphError: a node is not in the graph, or one that is no subgraph is to be folded.
@@ -78,12 +79,17 @@ def view_of(
         )
     if ports not in ("used", "all"):
         raise UsageError(f'{level.title}: ports= is "used", those that edges lead to, or "all", got {ports!r}')
+    if kind not in (None, *get_args(Kind)):
+        kinds = " or ".join(f'"{one}"' for one in get_args(Kind))
+        raise UsageError(f"{level.title}: view= is {kinds}, got {kind!r:.80}; leave it out for the clearest one")
     folded = _nodes(level, "fold", fold)
     for node in folded:
         if not is_box(node):
-            raise GraphError(f'"{node.place.path}" cannot be folded, for it is no subgraph; leave it out of fold=')
+            raise GraphError(
+                f'"{node.place.path}" cannot be folded, because it is not a subgraph; leave it out of fold='
+            )
     shown = None if active is None else frozenset(_nodes(level, "active", active))
-    return View(depth, frozenset(folded), shown, ports == "all")
+    return View(cast("Kind | None", kind), depth, frozenset(folded), shown, ports == "all")
 
 
 def _nodes(level: Level, what: str, given: Iterable[Node | str]) -> list[Node]:
@@ -117,7 +123,7 @@ _ENTITIES: Final = str.maketrans(
         "\t": " ",
     }
 )
-_SHAPES: Final[Mapping[Look, tuple[str, str]]] = MappingProxyType(
+_SHAPES: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     {"node": ("[", "]"), "port": ("([", "])"), "start": ("((", "))"), "stop": ("(((", ")))"), "feed": ("{{", "}}")}
 )
 
@@ -131,7 +137,7 @@ def mermaid(graph: HasLevel, view: View = EVERYTHING) -> str:
         lines += [f"{'    ' * (depth - up)}end" for up in range(depth - level)]
         depth = level
         indent = "    " * (depth + 1)
-        if isinstance(item, Box):
+        if item.look == "box":
             lines.append(f"{indent}subgraph {item.id}[{_quoted(item.label)}]")
             depth += 1
         else:
@@ -154,9 +160,9 @@ def _mermaid_arrow(arrow: Arrow) -> str:
 
 
 def _mermaid_styles(seen: Picture) -> list[str]:
-    """Tint the states; Mermaid has no line that is both thick and dashed, so those are said one by one."""
+    """Tint the states; Mermaid has no line that is both thick and dashed, so those are declared one by one."""
     lines = []
-    shapes = [item for _, item in seen.items if isinstance(item, Shape)]
+    shapes = [item for _, item in seen.items if item.look != "box"]
     states = [shape.id for shape in shapes if shape.is_state and not shape.is_active]
     active = [shape.id for shape in shapes if shape.is_active]
     if states:
@@ -176,7 +182,7 @@ def _mermaid_styles(seen: Picture) -> list[str]:
 
 # A backslash begins an escape of Graphviz, such as the name of the node; an ampersand an entity of HTML.
 _ESCAPES: Final = str.maketrans({"\\": "\\\\", '"': '\\"', "&": "&amp;", "\n": "\\n", "\r": " "})
-_DOT_SHAPES: Final[Mapping[Look, str]] = MappingProxyType(
+_DOT_SHAPES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "node": "shape=box",
         "port": "shape=box, style=rounded, height=0.3",
@@ -201,7 +207,7 @@ def dot(graph: HasLevel, view: View = EVERYTHING) -> str:
         lines += [f"{'    ' * (depth - up)}}}" for up in range(depth - level)]
         depth = level
         indent = "    " * (depth + 1)
-        if isinstance(item, Box):
+        if item.look == "box":
             lines.append(f"{indent}subgraph cluster_{item.id} {{")
             lines.append(f"{indent}    label={_escaped(item.label)}")
             depth += 1

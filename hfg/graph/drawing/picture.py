@@ -2,7 +2,7 @@
 
 Edges are drawn as they were connected; the ports of subgraphs, and those of the whole graph, are shapes of their own,
 so an arrow never begins or ends at a box. What lies in a folded subgraph is not seen, and whatever leads there leads to
-the subgraph. Nothing recurses: graphs may be as deep as they like. Stands on `structure`; changes nothing there.
+the subgraph. Nothing recurses: graphs may be as deep as they like. Depends on `structure`; changes nothing there.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any, Final, Literal, TypeAlias, TypeGuard
 
 import msgspec
 
-from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, is_feed, is_port
+from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, end_path, is_feed, is_port
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import HasLevel, Level, inside, level_of
 from hfg.graph.structure.naming import path_of
@@ -22,27 +22,37 @@ from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node, NodeType
 from hfg.ports import InnerSource, InnerTarget, Port
 
-__all__ = ["EVERYTHING", "Arrow", "Box", "Look", "Picture", "Pin", "Shape", "View", "picture"]
+__all__ = ["EVERYTHING", "Arrow", "Kind", "Look", "Picture", "Pin", "Shape", "View", "picture"]
 
-Look: TypeAlias = Literal["node", "port", "start", "stop", "feed"]
+Kind: TypeAlias = Literal["activity", "mission", "all"]
+Look: TypeAlias = Literal["node", "box", "port", "start", "stop", "feed"]
 
 _LAST: Final = 1_000_000  # ports that every node has are behind its own
 
 
 class View(msgspec.Struct, frozen=True):
-    """What somebody wants to see of a graph.
+    """What the user wants to see of a graph.
 
     Attributes:
+      kind: "activity" shows states and what feeds them, "mission" all with data in bundles, "all" every edge by itself.
+        None: "mission" if activity moves between nodes of the level, else "all".
       depth: so many subgraphs inside each other are open, all others folded; None opens all.
       folded: these subgraphs are, whatever the depth.
       active: these nodes and subgraphs are shown as active; None: those that are, in a run.
       all_ports: ports are shown that nothing is connected to, too.
+      measured: nodes have room for bars and figures.
+      places: upper left corners of nodes that the user has chosen, by path; they are kept.
+      only: these paths alone are placed, around all others, which stay at their places.
     """
 
+    kind: Kind | None = None
     depth: int | None = None
     folded: frozenset[Node] = frozenset()
     active: frozenset[Node] | None = None
     all_ports: bool = False
+    measured: bool = False
+    places: Mapping[str, tuple[float, float]] = {}
+    only: frozenset[str] | None = None
 
 
 EVERYTHING: Final = View()
@@ -54,7 +64,7 @@ class Pin(msgspec.Struct, frozen=True):
     Attributes:
       kind: "input", "output", "slot", "event" or "parameter"; "gate" and "active" are the two ends of a gate.
       order: where it is among the ports that the node's type declares of this kind.
-      is_plain: it is the only port that it could be, so nobody needs its name.
+      is_plain: it is the only port that it could be, so its name is not needed.
     """
 
     kind: str
@@ -64,10 +74,10 @@ class Pin(msgspec.Struct, frozen=True):
 
 
 class Shape(msgspec.Struct):
-    """A node, or a port that is drawn by itself.
+    """A node, an open subgraph (look "box"), or a port that is drawn by itself; what is in a box follows it, deeper.
 
     Attributes:
-      id: "n0", "n1", ... in order of appearance.
+      id: "n0", "n1", ... in order of appearance; "g0", ... of boxes.
       name: as users wrote it.
       details: what else is said about it, a line each.
       path: of the node; "" for ports.
@@ -77,7 +87,8 @@ class Shape(msgspec.Struct):
       is_state: an active edge begins or ends here.
       is_active: it is active now, in a run.
       is_enabled: it is at the start of a run.
-      is_folded: it is a subgraph with something inside that is not shown.
+      limit: how long it may be active, "10 s"; "" without a limit.
+      inner: how many nodes are inside that are not shown.
     """
 
     id: str
@@ -91,29 +102,12 @@ class Shape(msgspec.Struct):
     is_state: bool = False
     is_active: bool = False
     is_enabled: bool = True
-    is_folded: bool = False
+    limit: str = ""
+    inner: int = 0
 
     def be_state(self) -> None:
         """An active edge meets it."""
         self.is_state = True
-
-    @property
-    def label(self) -> str:
-        """Name and details as lines of text."""
-        return "\n".join([self.name, *self.details])
-
-
-class Box(msgspec.Struct):
-    """A subgraph; what is in it follows it with a greater depth. Its attributes are those of a shape."""
-
-    id: str
-    name: str
-    details: list[str] = []
-    path: str = ""
-    type_name: str = ""
-    group: str = "loop"
-    is_active: bool = False
-    is_enabled: bool = True
 
     @property
     def label(self) -> str:
@@ -135,6 +129,7 @@ class Arrow(msgspec.Struct):
       is_active: it transports activity: the double line of the paper.
       is_gate: it is no edge; the tail is the state, the head what rests meanwhile.
       is_back: initial tokens lie on it, with which a circle of data begins.
+      ends: the paths of both ports; of a gate those of who opens it and who rests.
     """
 
     tail: str
@@ -147,18 +142,19 @@ class Arrow(msgspec.Struct):
     is_active: bool = False
     is_gate: bool = False
     is_back: bool = False
+    ends: tuple[str, str] = ("", "")
 
 
 class Picture(msgspec.Struct):
     """Everything to draw.
 
     Attributes:
-      items: boxes and shapes, each with its depth, the content of a box behind it.
+      items: all shapes, each with its depth, the content of a box behind it.
       groups: all groups of the graph in their order.
     """
 
     title: str
-    items: list[tuple[int, Box | Shape]]
+    items: list[tuple[int, Shape]]
     arrows: list[Arrow]
     groups: list[str]
 
@@ -226,10 +222,9 @@ class _Look:
                 if inner is None or inner not in insides or not (inner.nodes or ports):
                     self._node(depth, name, node, group)
                     continue
-                said = _details(options, node._type), inner.path, node._type.qualname, group
-                box = Box(f"g{self.boxes}", name, *said, self._is_active(node), options.enabled)
-                self.picture.items.append((depth, box))
+                box = self._shape_of(f"g{self.boxes}", name, "box", node, group)
                 self.boxes += 1
+                self.picture.items.append((depth, box))
                 for port, port_name in ports.items():
                     self._port_of_box(depth + 1, port, port_name)
                 stack.append((iter(inner.nodes.items()), group))
@@ -247,22 +242,26 @@ class _Look:
         return "loop"
 
     def _node(self, depth: int, name: str, node: Node, group: str) -> None:
-        inner = inside(node)
         declared = _declared(node) if self.view.all_ports else {}
-        shape = Shape(
-            self._next_id,
-            name,
-            "node",
-            type_name=node._type.qualname,
-            is_active=self._is_active(node),
-            details=_details(node._options, node._type),
-            path=path_of(node),
-            group=group,
-            pins=[Pin(*port, order) for port, order in declared.items() if port[0] != "parameter"],
-            is_enabled=node._options.enabled,
-            is_folded=inner is not None and bool(inner.nodes),
-        )
+        shape = self._shape_of(self._next_id, name, "node", node, group)
+        shape.pins += [Pin(*port, order) for port, order in declared.items() if port[0] != "parameter"]
         self._show(depth, node, shape)
+
+    def _shape_of(self, id_: str, name: str, look: Look, node: Node, group: str) -> Shape:
+        options, inner = node._options, inside(node)
+        return Shape(
+            id_,
+            name,
+            look,
+            _details(options, node._type),
+            path_of(node),
+            node._type.qualname,
+            group,
+            is_active=self._is_active(node),
+            is_enabled=options.enabled,
+            limit="" if options.active_for_s is None else f"{options.active_for_s:g} s",
+            inner=0 if inner is None or look == "box" else sum(len(one.nodes) for one in _depth_first(inner)),
+        )
 
     def _port_of_box(self, depth: int, port: Port | tuple[Node, str], name: str) -> None:
         self._shape(depth, port, name, "port", port.kind if isinstance(port, Port) else port[1])
@@ -277,6 +276,7 @@ class _Look:
         label = ", ".join(part for part in (_ports_label(edge), said) if part)
         pins = self._pin(edge.source, _source_name(edge.source)), self._pin(edge.target, _target_name(edge.target))
         arrow = Arrow(*ends, label, *pins, said, is_signal, edge.active, is_back=bool(edge.options.initial))
+        arrow.ends = end_path(edge.source), end_path(edge.target)
         self.picture.arrows.append(arrow)
         for end in ends:
             if edge.active and self.shapes[end].look == "node":
@@ -299,7 +299,8 @@ class _Look:
         (by, out_of), (target, into) = self._end_of_gate(gate.by, "active"), self._end_of_gate(gate.target, "gate")
         said = "" if gate.idle_rate_hz is None else f"else {gate.idle_rate_hz:g} Hz"
         label = f"gate, {said}" if said else "gate"
-        self.picture.arrows.append(Arrow(by, target, label, out_of, into, said, is_gate=True))
+        ends = path_of(gate.by), path_of(gate.target)
+        self.picture.arrows.append(Arrow(by, target, label, out_of, into, said, is_gate=True, ends=ends))
 
     def _end_of_gate(self, node: Node, what: str) -> tuple[str, Pin | None]:
         if node in self.ids:
@@ -317,7 +318,14 @@ class _Look:
             outer = self.ids.get(level.owner.ports.parameters[name])
             if outer is not None:
                 self.picture.arrows.extend(
-                    Arrow(outer, self._end(inner), f"→ {inner.name}", None, self._pin(inner, inner.name))
+                    Arrow(
+                        outer,
+                        self._end(inner),
+                        f"→ {inner.name}",
+                        None,
+                        self._pin(inner, inner.name),
+                        ends=("", inner.path),
+                    )
                     for inner in ports
                 )
 
@@ -337,7 +345,7 @@ class _Look:
 
 
 def _opened(level: Level, view: View) -> tuple[list[Level], Mapping[Node, Node]]:
-    """Give the levels that are seen, the outer ones first, each box before the next; and who is hidden in which box."""
+    """Return the levels that are seen, the outer ones first, each box before the next; also who is hidden in which."""
     opened: list[Level] = []
     hidden: dict[Node, Node] = {}
     waiting: list[tuple[Level, int, Node | None]] = [(level, 0, None)]
@@ -356,7 +364,7 @@ def _opened(level: Level, view: View) -> tuple[list[Level], Mapping[Node, Node]]
 
 
 def _lit(level: Level, view: View) -> set[Node]:
-    """Give who is shown as active: also the subgraphs around them, which are so, too (rule G2)."""
+    """Return who is shown as active: also the subgraphs around them, which are so, too (rule G2)."""
     shown: Iterable[Node] = view.active or ()
     if view.active is None:
         shown = (node for one in _depth_first(level) for node in one.nodes.values() if node.active)
@@ -370,7 +378,7 @@ def _lit(level: Level, view: View) -> set[Node]:
 
 
 def _depth_first(level: Level) -> Iterator[Level]:
-    """Give a level and all that are in its boxes, each box before the next."""
+    """Yield a level and all that are in its boxes, each box before the next."""
     waiting = [level]
     while waiting:
         one = waiting.pop()
@@ -390,12 +398,12 @@ def _ports_of_boxes(edges: Iterable[Edge]) -> dict[Any, dict[Any, str]]:
 
 
 def _outside(end: PortEnd) -> Port:
-    """Give the port of a subgraph that an inner side belongs to; another port is its own."""
+    """Return the port of a subgraph that an inner side belongs to; another port is its own."""
     return end.outer if isinstance(end, InnerSource | InnerTarget) else end
 
 
 def _declared(node: Node) -> dict[tuple[str, str], int]:
-    """Give the ports that a node's type declares, by kind and name, numbered in their order."""
+    """Return the ports that a node's type declares, by kind and name, numbered in their order."""
     type_ = node._type
     slots = [name for name, slot in type_.slots.items() if slot.handler_name or type_.is_subgraph]
     kinds: tuple[tuple[str, Iterable[str]], ...] = (

@@ -1,101 +1,211 @@
-"""What is laid out, blocks and the lines between them, and what comes of it. All lengths are pixels, y goes down."""
+"""How large things are, and where on their borders the ports are.
+
+What stands in a node, from the top: names of slots, its own name with badges, options or measures, names of inputs
+and outputs in rows where they are needed, names of events. Heights and widths are whole multiples of 8.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Literal, TypeAlias
+import math
+from collections.abc import Mapping, Sequence
+from typing import Final
 
-import msgspec
-from msgspec import structs
+from hfg.graph.drawing.layout.parts import Side, Spot, Thing
+from hfg.graph.drawing.text import shortened, width_of
 
-__all__ = ["Block", "Dock", "Label", "Line", "Plan", "Point", "Side"]
+__all__ = [
+    "BADGE",
+    "DETAIL",
+    "GRID",
+    "LONGEST_NAME",
+    "LONGEST_PORT",
+    "LONGEST_SAID",
+    "NAME",
+    "PORT",
+    "TAG",
+    "TAG_HEIGHT",
+    "TO_TAG",
+    "badge_width",
+    "halves",
+    "place_level",
+    "room",
+    "rooms_beside",
+    "size",
+    "tag_text",
+    "tag_width",
+    "up",
+]
 
-Side: TypeAlias = Literal["left", "right", "top", "bottom"]
-Point: TypeAlias = tuple[float, float]
+NAME: Final = 13.0  # sizes of letters: names of nodes, of ports, options, tags
+PORT: Final = 11.0
+DETAIL: Final = 11.0
+BADGE: Final = 11.0
+TAG: Final = 10.0
+LONGEST_NAME: Final = 34  # letters
+LONGEST_PORT: Final = 26
+LONGEST_TAG: Final = 15
+LONGEST_SAID: Final = 48
+
+GRID: Final = 8.0
+_PAD: Final = 12.0
+_ROW: Final = 16.0  # named ports one below the other
+_COMB: Final = 10.0  # others
+_LEAST: Final = 22.0  # between ports side by side
+_MEASURED: Final = (72.0, 176.0)  # a node with bars
+TAG_HEIGHT: Final = 14.0
+TO_TAG: Final = 8.0  # the line from a port to its tag
 
 
-class Dock(msgspec.Struct):
-    """A place on the border of a block where lines begin or end.
+def up(number: float, grid: float = GRID) -> float:
+    """Round up to a whole multiple."""
+    return math.ceil(number / grid - 1e-9) * grid
 
-    Attributes:
-      side: lines reach it from there.
-      at: how far from the left or upper corner; the layout chooses it for top and bottom, unless `is_fixed`.
-      room: along the border, for its name; where the layout chooses.
+
+def badge_width(says: str) -> float:
+    """Return how wide a badge is: its sign, and what it says."""
+    return 18.0 + (width_of(shortened(says, LONGEST_PORT), BADGE) + 5.0 if says else 0.0)
+
+
+def tag_text(names: Sequence[str], *, is_in: bool) -> str:
+    """Write names into one tag; of many their number."""
+    names = list(dict.fromkeys(names))
+    text = ", ".join(shortened(name, LONGEST_PORT) for name in names)
+    return text if len(text) <= LONGEST_TAG or len(names) == 1 else f"{len(names)} {'in' if is_in else 'out'}"
+
+
+def tag_width(text: str) -> float:
+    """Return how wide a tag is."""
+    return math.ceil(width_of(text, TAG) + 12.0)
+
+
+def size(thing: Thing, *, measured: bool, inner: tuple[float, float] | None = None) -> None:
+    """Say how high and at least how wide a thing is, and how much room its tags need; `inner` is what it contains."""
+    sides = {
+        side: [one for one in thing.spots.values() if one.side == side] for side in ("left", "right", "top", "bottom")
+    }
+    names = [
+        max(0.0, *(width_of(shortened(one.says, LONGEST_PORT), PORT) for one in sides[side]), 0.0)
+        for side in ("left", "right")
+    ]
+    header = _header(thing, sides)
+    wide = [_title_width(thing), *(sum(map(room, sides[side])) + _PAD for side in ("top", "bottom"))]
+    rows = max(
+        (len(sides[side]) if any(one.says for one in sides[side]) else 0 for side in ("left", "right")), default=0
+    )
+    if rows:
+        wide.append(names[0] + names[1] + 32.0)
+    details = "  ".join(thing.shape.details)
+    wide.append(width_of(shortened(details, LONGEST_NAME), DETAIL) + 2 * _PAD)
+    height = header + _ROW * rows + (6.0 if rows else 0.0) + (14.0 if _is_named(sides["bottom"]) else 4.0)
+    height = max(height, *(_comb_height(sides[side]) for side in ("left", "right")), 40.0)
+    if inner is not None:
+        wide.append(inner[0] + 2 * 20.0)
+        height = max(height, header + inner[1] + 32.0)
+    elif measured and thing.shape.look == "node":
+        height, least = max(height, _MEASURED[0] if len(sides["top"] + sides["bottom"]) else 48.0), _MEASURED[1]
+        wide.append(least)
+    thing.width, thing.height = up(max(*wide, 96.0)), up(height)
+    _place_upright(thing, sides, header)
+    thing.left, thing.right = (_beside(sides[side]) for side in ("left", "right"))
+    thing.top = max((TAG_HEIGHT + TO_TAG for one in sides["top"] if one.tagged), default=0.0)
+    thing.bottom = max((TAG_HEIGHT + TO_TAG for one in sides["bottom"] if one.tagged), default=0.0)
+    thing.bottom = max(thing.bottom, 16.0 if any(one.outside for one in sides["bottom"]) else 0.0)
+
+
+def _header(thing: Thing, sides: dict[str, list[Spot]]) -> float:
+    """Return how far down the rows of ports begin."""
+    header = (18.0 if _is_named(sides["top"]) else 8.0) + 20.0
+    return header + (16.0 if thing.shape.details else 0.0)
+
+
+def _title_width(thing: Thing) -> float:
+    name = width_of(shortened(thing.shape.name, LONGEST_NAME), NAME, bold=True)
+    badges = sum(badge_width(one.says) + 6.0 for one in thing.badges)
+    return name + badges + (26.0 + 7.0 * len(str(thing.shape.inner)) if thing.shape.inner else 0.0) + 2 * _PAD
+
+
+def _is_named(spots: Sequence[Spot]) -> bool:
+    return any(one.says for one in spots)
+
+
+def _comb_height(spots: Sequence[Spot]) -> float:
+    return 0.0 if _is_named(spots) else _COMB * len(spots) + 6.0
+
+
+def halves(spot: Spot) -> tuple[float, float]:
+    """Return how much room a port on top or bottom needs left and right of it."""
+    own = max(width_of(shortened(spot.says, LONGEST_PORT), PORT) / 2 + 4.0 if spot.says else 0.0, _LEAST / 2)
+    left = right = own
+    if spot.kind == "timeout":
+        left, right = _LEAST / 2, 2 * own + 8.0  # its limit is written on its right
+    if spot.outside:
+        right = max(right, width_of(shortened(spot.outside, LONGEST_SAID), PORT) + 14.0)
+    if spot.tagged:
+        tag = tag_width(tag_text(spot.tagged, is_in=spot.side == "top"))
+        left, right = (
+            (left, max(right, tag + 12.0)) if spot.is_linked else (max(left, tag / 2 + 4), max(right, tag / 2 + 4))
+        )
+    return left, right
+
+
+def room(spot: Spot) -> float:
+    """Return how much room a port on top or bottom needs next to others."""
+    return sum(halves(spot))
+
+
+def _beside(spots: Sequence[Spot]) -> float:
+    """Return how much room tags need on the left or right."""
+    tags = [one.tagged for one in spots if one.tagged]
+    if not _is_named(spots):  # they share one
+        tags = [[name for names in tags for name in names]] if tags else []
+    texts = [tag_text(names, is_in=spots[0].side == "left") for names in tags]
+    return max((tag_width(text) + TO_TAG + 6.0 for text in texts), default=0.0)
+
+
+def _order_upright(spot: Spot) -> tuple[object, ...]:
+    """Return the order of ports on the left and right: bundles first, then single lines, then tags, then parameters."""
+    only_tag = bool(spot.tagged) and not spot.is_linked
+    return spot.kind == "parameter", only_tag, spot.comb < 0, spot.comb, spot.order, spot.name
+
+
+def _place_upright(thing: Thing, sides: dict[str, list[Spot]], header: float) -> None:
+    for side in ("left", "right"):
+        spots = sorted(sides[side], key=_order_upright)
+        pitch = _ROW if _is_named(spots) else _COMB
+        at = header + 9.0 if _is_named(spots) else thing.height / 2 - pitch * (len(spots) - 1) / 2
+        for spot in spots:
+            spot.at = at
+            at += pitch
+
+
+def place_level(thing: Thing, spine: Mapping[Side, Spot | None]) -> None:
+    """Put the ports on top and bottom side by side, in the order of where their lines go.
+
+    One of each side may be on the spine; what goes left is left of it. The others stand around the middle.
     """
-
-    side: Side
-    at: float = 0.0
-    room: float = 12.0
-    is_fixed: bool = False
-
-
-class Block(msgspec.Struct):
-    """A rectangle.
-
-    Attributes:
-      rank: "first" or "last": in a column before or behind all others.
-      tier: of those blocks, who is above whom in any case.
-    """
-
-    width: float
-    height: float
-    docks: list[Dock]
-    rank: Literal["", "first", "last"] = ""
-    tier: int = 0
-
-    def add(self, dock: Dock) -> int:
-        """Give it one more dock, and say which one it is."""
-        self.docks.append(dock)
-        return len(self.docks) - 1
-
-    def settle(self, places: Sequence[float]) -> None:
-        """Take the places of the docks from the layout."""
-        self.docks = [structs.replace(dock, at=at) for dock, at in zip(self.docks, places, strict=True)]
+    for side in ("top", "bottom"):
+        spots = sorted((one for one in thing.spots.values() if one.side == side), key=lambda one: (one.pull, one.order))
+        straight = spine.get(side)
+        if straight is None:
+            at = (thing.width - sum(map(room, spots))) / 2
+        else:
+            spots.remove(straight)
+            before = [one for one in spots if one.pull < 0]
+            at = thing.spine - halves(straight)[0] - sum(map(room, before))
+            spots = [*before, straight, *(one for one in spots if one.pull >= 0)]
+        for spot in spots:
+            spot.at = round(at + halves(spot)[0])
+            at += room(spot)
 
 
-class Label(msgspec.Struct, frozen=True):
-    """Room for a text above a line."""
-
-    width: float
-    height: float
-
-
-class Line(msgspec.Struct):
-    """A connection of two blocks.
-
-    Attributes:
-      tail: which block it begins at, by its position in the list.
-      tail_dock: at which of its docks.
-      head: where it ends, likewise.
-      head_dock: likewise.
-      kind: lines of one kind from one dock run together as long as they can.
-      is_data: it should lead to the right, more than others should.
-      is_back: it is the one that may lead to the left.
-    """
-
-    tail: int
-    tail_dock: int
-    head: int
-    head_dock: int
-    kind: str = ""
-    is_data: bool = True
-    is_back: bool = False
-    label: Label | None = None
-
-
-class Plan(msgspec.Struct):
-    """Where everything is.
-
-    Attributes:
-      blocks: the left upper corner of each.
-      lines: the corners of each, from tail to head.
-      dots: for each line, where it parts from others that came along with it; each is told once.
-      labels: for each line the left lower corner of its label, if it has one.
-    """
-
-    width: float
-    height: float
-    blocks: list[Point]
-    lines: list[list[Point]]
-    dots: list[list[Point]]
-    labels: list[Point | None]
+def rooms_beside(thing: Thing, spine: Mapping[Side, Spot | None]) -> tuple[float, float]:
+    """Return how much room a thing needs left and right of its spine."""
+    left = right = 48.0
+    for side in ("top", "bottom"):
+        spots = [one for one in thing.spots.values() if one.side == side]
+        straight = spine.get(side)
+        if straight is not None:
+            before, behind = halves(straight)
+            left = max(left, before + 8.0 + sum(room(one) for one in spots if one is not straight and one.pull < 0))
+            right = max(right, behind + 8.0 + sum(room(one) for one in spots if one is not straight and one.pull >= 0))
+    return left, right

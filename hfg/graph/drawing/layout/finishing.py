@@ -1,0 +1,326 @@
+"""From a level that is placed to plain data: tags, combs, dots, and texts where there is room for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from typing import Final, TypeAlias
+
+from hfg.graph.drawing.layout.blocks import LONGEST_SAID, PORT, TAG_HEIGHT, TO_TAG, tag_text, tag_width
+from hfg.graph.drawing.layout.parts import Link, Spot, Thing, Work
+from hfg.graph.drawing.model import EdgeEnds, Line, NodeBox, Point, PortSpot, Tag
+from hfg.graph.drawing.picture import Arrow
+from hfg.graph.drawing.text import shortened, width_of
+
+__all__ = ["lines_of", "node_of"]
+
+_PILL: Final = (18.0, 16.0)
+_CLEAR: Final = 2.0
+
+Box: TypeAlias = tuple[float, float, float, float]
+"""Left, top, right and bottom."""
+
+
+def node_of(thing: Thing, x: float, y: float, *, has_rows: bool, has_ports: bool) -> NodeBox:
+    """Return a thing as it is drawn, with its level so far from the corner of the picture."""
+    shape = thing.shape
+    ports = []
+    for spot in thing.spots.values() if has_ports else ():
+        at_x, at_y = thing.where(spot)
+        ports.append(PortSpot(spot.kind, spot.name, x + at_x, y + at_y, spot.says))
+    is_box = shape.look == "box"
+    return NodeBox(
+        shape.path or shape.id,
+        shape.name,
+        "subgraph" if is_box or shape.inner else "node" if shape.look == "node" else "wire",
+        shape.type_name,
+        shape.group,
+        x + thing.x,
+        y + thing.y,
+        thing.width,
+        thing.height,
+        thing.row if has_rows and shape.is_state else None,
+        thing.lane,
+        shape.is_state,
+        shape.is_active,
+        shape.is_enabled,
+        is_box,
+        shape.inner,
+        tuple(shape.details),
+        tuple(thing.badges),
+        tuple(ports),
+    )
+
+
+def lines_of(work: Work, x: float, y: float) -> Iterator[Line]:
+    """Yield all lines of a level as they are drawn, with the level so far from the corner of the picture."""
+    tagged = list(_tagged(work.things, work.links))
+    inner = [link for link in work.links if link.tail is not None and link.head is not None]
+    for link in inner:
+        _comb(link)
+    dots = _dots(inner)
+    taken = _Taken(work.things, [tag for _, _, tag in tagged], inner)
+    for link in inner:
+        count_at = taken.pill(link, inner) if len(link.tail_spots) > 1 else None
+        says_at = taken.text(link, link.said) if link.said else None
+        said = link.said or ", ".join(dict.fromkeys(arrow.said for arrow in link.arrows if arrow.said))
+        yield _moved(_line(link.arrows, link.points, link, dots.get(id(link), ()), count_at, said, says_at, None), x, y)
+    for arrows, points, tag in tagged:
+        yield _moved(_line(arrows, points, None, (), None, "", None, tag), x, y)
+
+
+def _line(
+    arrows: Sequence[Arrow],
+    points: Sequence[Point],
+    link: Link | None,
+    dots: Iterable[Point],
+    count_at: Point | None,
+    said: str,
+    says_at: Point | None,
+    tag: Tag | None,
+) -> Line:
+    first = arrows[0]
+    return Line(
+        tuple(EdgeEnds(*arrow.ends, " -> ".join(arrow.ends)) for arrow in arrows),
+        "signal" if first.is_signal else "data",
+        first.is_active,
+        link is not None and link.is_back,
+        tuple(points),
+        () if link is None else tuple(tuple(comb) for comb in link.combs),
+        tuple(dots),
+        count_at,
+        said,
+        says_at,
+        tag,
+        -1 if link is None else link.net,
+    )
+
+
+def _moved(line: Line, x: float, y: float) -> Line:
+    def to(point: Point | None) -> Point | None:
+        return None if point is None else (point[0] + x, point[1] + y)
+
+    def all_to(points: Iterable[Point]) -> tuple[Point, ...]:
+        return tuple((at_x + x, at_y + y) for at_x, at_y in points)
+
+    tag = line.tag
+    return Line(
+        line.edges,
+        line.kind,
+        line.is_active,
+        line.is_back,
+        all_to(line.points),
+        tuple(map(all_to, line.combs)),
+        all_to(line.dots),
+        to(line.count_at),
+        line.says,
+        to(line.says_at),
+        None if tag is None else Tag(tag.text, tag.ports, tag.kind, tag.x + x, tag.y + y, tag.width, tag.height),
+        line.net,
+    )
+
+
+# --- tags
+
+
+def _tagged(things: Sequence[Thing], links: Sequence[Link]) -> Iterator[tuple[list[Arrow], list[Point], Tag]]:
+    """Yield the lines between ports and tags; where ports have no names those of one side share a tag."""
+    groups: dict[tuple[object, ...], list[Link]] = {}
+    for link in links:
+        thing, spot, is_in = _tag_end(link)
+        if thing is not None and spot is not None:
+            side = [one for one in thing.spots.values() if one.side == spot.side]
+            is_shared = spot.side in ("left", "right") and not any(one.says for one in side) and not spot.is_linked
+            key: tuple[object, ...] = (id(spot), is_in)
+            if is_shared:
+                key = (thing.number, spot.side, is_in, link.is_signal, link.is_active, link.is_jump)
+            groups.setdefault(key, []).append(link)
+    for members in groups.values():
+        members.sort(key=lambda one: not one.is_active)
+        thing, spot, is_in = _tag_end(members[0])
+        assert thing is not None
+        assert spot is not None
+        spots = list({id(one): one for link in members if (one := _tag_end(link)[1]) is not None}.values())
+        names = list(dict.fromkeys(name for one in spots for name in one.tagged))
+        at = thing.where(spot)[0], sum(thing.where(one)[1] for one in spots) / len(spots)
+        points, tag = _tag(spot, at, names, _kind_of_tag(members[0], is_in=is_in))
+        for number, one in enumerate(spots):
+            own = [arrow for link in members if _tag_end(link)[1] is one for arrow in link.arrows]
+            way = points if len(spots) == 1 else _to_bar(thing.where(one), points)
+            yield (
+                own,
+                (way[::-1] if is_in else way),
+                (tag if number == 0 else Tag("", tag.ports, tag.kind, tag.x, tag.y, 0.0, 0.0)),
+            )
+
+
+def _tag_end(link: Link) -> tuple[Thing | None, Spot | None, bool]:
+    """Return the port of a thing that a tag stands at, and whether the line leads from the tag to it."""
+    if link.tail is None and link.head is not None:
+        return link.head, link.head_spots[0], True
+    if link.head is None and link.tail is not None:
+        return link.tail, link.tail_spots[0], False
+    return None, None, False
+
+
+def _kind_of_tag(link: Link, *, is_in: bool) -> str:
+    if link.is_jump:
+        return "from" if is_in else "to"
+    if is_in:
+        return "slot" if link.is_signal else "input"
+    return "event" if link.is_signal else "output"
+
+
+def _tag(spot: Spot, at: Point, names: Sequence[str], kind: str) -> tuple[list[Point], Tag]:
+    """Put a tag in front of a port; next to its line if one leads on from there."""
+    x, y = at
+    text = tag_text(names, is_in=kind in ("input", "slot", "from"))
+    width, half = tag_width(text), TAG_HEIGHT / 2
+    sign = -1 if spot.side in ("left", "top") else 1
+    if spot.side in ("left", "right"):
+        if spot.is_linked:
+            points = [(x, y), (x + 8 * sign, y), (x + 8 * sign, y + 14), (x + TO_TAG * sign, y + 14)]
+            y += 14.0
+        else:
+            points = [(x, y), (x + TO_TAG * sign, y)]
+        left = x + TO_TAG if sign > 0 else x - TO_TAG - width
+        return points, Tag(text, tuple(names), kind, left, y - half, width, TAG_HEIGHT)
+    if spot.is_linked:
+        points = [(x, y), (x, y + 12 * sign), (x + 10, y + 12 * sign)]
+        return points, Tag(text, tuple(names), kind, x + 10, y + 12 * sign - half, width, TAG_HEIGHT)
+    top = y + TO_TAG if sign > 0 else y - TO_TAG - TAG_HEIGHT
+    return [(x, y), (x, y + TO_TAG * sign)], Tag(text, tuple(names), kind, round(x - width / 2), top, width, TAG_HEIGHT)
+
+
+def _to_bar(port: Point, points: Sequence[Point]) -> list[Point]:
+    """Lead from one of several ports to the tag that they share."""
+    (_, y), (end, _) = points[0], points[-1]
+    bar = port[0] + (end - port[0]) * 0.6
+    return [port, (bar, port[1]), (bar, y), (end, y)] if port[1] != y else [port, (end, y)]
+
+
+# --- lines
+
+
+def _comb(link: Link) -> None:
+    """Lead from the ends of a bundle to its ports."""
+    link.combs = []
+    if len(link.tail_spots) < 2:
+        return
+    for thing, spots, end in (
+        (link.tail, link.tail_spots, link.points[0]),
+        (link.head, link.head_spots, link.points[-1]),
+    ):
+        assert thing is not None
+        used = {id(one): one for one in spots}.values()
+        for spot in used if len(used) > 1 else ():
+            x, y = thing.where(spot)
+            bar = (end[0], y) if spot.side in ("left", "right") else (x, end[1])
+            link.combs.append([end, bar, (x, y)] if bar != end else [end, (x, y)])
+
+
+def _dots(links: Sequence[Link]) -> dict[int, list[Point]]:
+    """Say where lines of one net part or join: three ways lead on from there. Each dot belongs to one line."""
+    nets: dict[int, list[Link]] = {}
+    for link in links:
+        nets.setdefault(link.net, []).append(link)
+    found: dict[int, list[Point]] = {}
+    for members in nets.values():
+        if len(members) < 2:
+            continue
+        strokes = [pair for link in members for pair in pairwise(link.points)]
+        ends = {link.points[end] for link in members for end in (0, -1)}
+        seen: set[Point] = set()
+        for link in members:
+            for point in link.points[1:-1]:
+                if point not in seen and point not in ends and len(_directions(point, strokes)) > 2:
+                    found.setdefault(id(link), []).append(point)
+                seen.add(point)
+    return found
+
+
+def _directions(point: Point, strokes: Iterable[tuple[Point, Point]]) -> set[tuple[int, int]]:
+    """Say in which directions strokes lead away from a point."""
+    x, y = point
+    found = set()
+    for (x1, y1), (x2, y2) in strokes:
+        if min(x1, x2) <= x <= max(x1, x2) and min(y1, y2) <= y <= max(y1, y2):
+            for end_x, end_y in ((x1, y1), (x2, y2)):
+                if (end_x, end_y) != point:
+                    found.add(((end_x > x) - (end_x < x), (end_y > y) - (end_y < y)))
+    return found
+
+
+# --- texts
+
+
+class _Taken:
+    """Where something is already, so that no text is written over it."""
+
+    def __init__(self, things: Iterable[Thing], tags: Iterable[Tag], links: Sequence[Link]) -> None:
+        self.boxes: list[Box] = [(one.x, one.y, one.x + one.width, one.y + one.height) for one in things]
+        self.boxes += [(tag.x, tag.y, tag.x + tag.width, tag.y + tag.height) for tag in tags]
+        self.links = links
+
+    def _is_free(self, box: Box, link: Link) -> bool:
+        left, top, right, bottom = box
+        for x1, y1, x2, y2 in self.boxes:
+            if left < x2 + _CLEAR and x1 < right + _CLEAR and top < y2 + _CLEAR and y1 < bottom + _CLEAR:
+                return False
+        for other in self.links:
+            if other.net != link.net or other is not link:
+                for (x1, y1), (x2, y2) in pairwise(other.points):
+                    if min(x1, x2) < right and left < max(x1, x2) and min(y1, y2) < bottom and top < max(y1, y2) + 0.1:
+                        return False
+                    if x1 == x2 and left < x1 < right and min(y1, y2) < bottom and top < max(y1, y2):
+                        return False
+        return True
+
+    def pill(self, link: Link, links: Sequence[Link]) -> Point | None:
+        """Find a place for the number of a bundle, best where the line runs by itself."""
+        width, height = _PILL
+        shared = {
+            pair for other in links if other.net == link.net and other is not link for pair in pairwise(other.points)
+        }
+        strokes = sorted(pairwise(link.points), key=lambda pair: (pair in shared, -_length(pair)))
+        for (x1, y1), (x2, y2) in strokes:
+            for part in (0.5, 0.35, 0.65, 0.2, 0.8):
+                x, y = x1 + (x2 - x1) * part, y1 + (y2 - y1) * part
+                box = (x - width / 2, y - height / 2, x + width / 2, y + height / 2)
+                if self._is_free(box, link):
+                    self.boxes.append(box)
+                    return x, y
+        return None
+
+    def text(self, link: Link, says: str) -> Point | None:
+        """Find a place for a text, above or next to a part of its line."""
+        width = width_of(shortened(says, LONGEST_SAID), PORT)
+        if link.tail is not None and link.tail_spots[0].outside:  # there is room for it below its port
+            x, y = link.points[0]
+            if (x + 6, y + 4, x + 6 + width, y + 15) in self.boxes:
+                return None  # another line from there says it
+            self.boxes.append((x + 6, y + 4, x + 6 + width, y + 15))
+            return x + 6, y + 14
+        for (x1, y1), (x2, y2) in sorted(
+            pairwise(link.points), key=lambda pair: (pair[0][0] == pair[1][0], -_length(pair))
+        ):
+            left, top = min(x1, x2), min(y1, y2)
+            if y1 == y2:
+                spare = abs(x2 - x1) - width
+                places = [(left + max(spare, 0) * part, y1 + off) for off in (-4.0, 13.0) for part in (0.5, 0.1, 0.9)]
+            else:
+                places = [
+                    (x1 + off, top + abs(y2 - y1) * part + 4)
+                    for off in (6.0, -6.0 - width)
+                    for part in (0.5, 0.25, 0.75)
+                ]
+            for x, y in places:
+                box = (x, y - 9.0, x + width, y + 2.0)
+                if self._is_free(box, link):
+                    self.boxes.append(box)
+                    return x, y
+        return None
+
+
+def _length(pair: tuple[Point, Point]) -> float:
+    return abs(pair[0][0] - pair[1][0]) + abs(pair[0][1] - pair[1][1])
