@@ -40,7 +40,7 @@ class Follower(Protocol):
         """There is a run now: its active nodes, and how long it has been running."""
 
     def run_ends(self, at: float) -> None:
-        """The run is over, after so many seconds."""
+        """The run is over, after this many seconds."""
 
     def run_event(self, event: TraceEvent) -> None:
         """Something has changed in it that has to do with no single token."""

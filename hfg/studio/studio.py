@@ -43,6 +43,9 @@ __all__ = ["Studio"]
 
 _LOGGER: Final = Log("hfg.studio")
 _BEAT_S: Final = 1 / 60
+_SHARE: Final = 0.03
+"""Of the loop's time, for all streams of all pages together: if they want more, they all get fewer frames."""
+
 _MOST_VIEWERS: Final = 32
 _MOST_LEVELS: Final = 64
 
@@ -140,7 +143,6 @@ class Studio(Following):
         viewer.joined = True
         self.viewers_changed()
         self.layouts_wanted()
-        self.check_soon()
 
     def _level(self, viewer: Viewer, level: tuple[str, str], is_open: bool) -> None:
         if is_open and len(viewer.levels) < _MOST_LEVELS:
@@ -168,11 +170,13 @@ class Studio(Following):
     def _beat(self) -> None:
         """Send what is new. Without subscriptions there is no beat."""
         loop = asyncio.get_running_loop()
+        began = loop.time()
+        for viewer in list(self.viewers.values()):
+            viewer.beat(began)
         self._beating = None
         if any(viewer.subscriptions for viewer in self.viewers.values()):
-            self._beating = loop.call_later(_BEAT_S, self._beat)
-        for viewer in list(self.viewers.values()):
-            viewer.beat(loop.time())
+            pause = max(_BEAT_S, (loop.time() - began) / _SHARE)
+            self._beating = loop.call_later(pause, self._beat)
 
     # --- requests ---
 

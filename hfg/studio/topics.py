@@ -35,7 +35,9 @@ _MOST_MOVES: Final = 256
 _NEAR: Final = 8
 """How many changes of activity before one may be its cause."""
 
-_MOST_BOXES: Final = 4000
+_MOST_BOXES: Final = 400
+"""In a frame: more than can be seen in a tenth of a second; what else there was is counted."""
+
 _MOST_POINTS: Final = 2000
 
 
@@ -48,6 +50,7 @@ class _Topic:
 
     credit = 2
     kind = 0
+    most_hz = 30.0
 
     def __init__(self, host: Following) -> None:
         self.host = host
@@ -190,6 +193,7 @@ class _Flows(_Sampled):
     """How much passes chosen edges, packed."""
 
     kind = 2
+    most_hz = 10.0
 
     def __init__(self, host: Following, edges: list[str]) -> None:
         super().__init__(host)
@@ -230,6 +234,8 @@ class _Flows(_Sampled):
 class _Node(_Topic):
     """Everything that is measured of one node."""
 
+    most_hz = 4.0
+
     def __init__(self, host: Following, path: str) -> None:
         super().__init__(host)
         self._path = path
@@ -246,7 +252,7 @@ def node_measures(host: Following, path: str) -> dict[str, Any]:
     """
     if host.steering.run is None:
         raise Refused("state", "the graph does not run, so nothing is measured")
-    found = host.steering.run.statistics().nodes.get(path)
+    found = host.steering.run.sampler().statistics(path)
     if found is None:
         raise Refused("unknown", f'no node at "{path}" runs', path)
     return {
@@ -269,20 +275,19 @@ def node_measures(host: Following, path: str) -> dict[str, Any]:
     }
 
 
-class _Load(_Topic):
+class _Load(_Sampled):
     """How busy the groups are."""
 
+    most_hz = 2.0
+
     def news(self) -> Any:
-        if self.run is None:
+        if self.sampler is None:
             return None
-        seen = self.run.statistics()
+        self.sampler.settle()
+        loads = self.sampler.loads()
         return {
-            "firings_hz": sum(one.rate_hz for one in seen.groups.values()),
-            "lost_activity": seen.lost_activity,
-            "groups": {
-                name: {"busy_share": one.busy_share, "rate_hz": one.rate_hz, "queued": one.queued, "nodes": one.nodes}
-                for name, one in seen.groups.items()
-            },
+            "firings_hz": sum(one.rate_hz for one in loads.values()),
+            "groups": {name: one._asdict() for name, one in loads.items()},
         }
 
 
@@ -290,6 +295,7 @@ class _Tapped(_Topic):
     """What passes a port or an edge."""
 
     size = 1
+    most_hz = 10.0
 
     def __init__(self, host: Following, path: str) -> None:
         super().__init__(host)
@@ -343,6 +349,7 @@ class _Image(_Tapped):
 
     credit = 1
     kind = 3
+    most_hz = 15.0
 
     def __init__(self, host: Following, path: str, size: int, quality: int) -> None:
         super().__init__(host, path)
@@ -390,7 +397,9 @@ class _History(_Tapped):
 
 
 class _Timeline(_Sampled):
-    """Firings and calls as they end."""
+    """Firings and calls as they end; of very many in a short time only the newest."""
+
+    most_hz = 10.0
 
     def __init__(self, host: Following) -> None:
         super().__init__(host)
@@ -414,6 +423,7 @@ class _Timeline(_Sampled):
     def news(self) -> Any:
         if self.sampler is None:
             return None
+        self.sampler.settle()
         boxes = [self._boxes.popleft() for _ in range(len(self._boxes))]
         done, self._done = self._done, self.sampler.done()
         rows = []
@@ -427,6 +437,8 @@ class _Timeline(_Sampled):
 
 class _Log(_Topic):
     """Records of hfg's loggers."""
+
+    most_hz = 5.0
 
     def __init__(self, host: Following) -> None:
         super().__init__(host)

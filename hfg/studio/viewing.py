@@ -43,10 +43,12 @@ class Topic(Protocol):
     Attributes:
       credit: frames that may be in flight.
       kind: of its binary frames; 0: its frames are JSON.
+      most_hz: frames per second at most.
     """
 
     credit: int
     kind: int
+    most_hz: float
 
     def take(self) -> Any:
         """Return what is new since the last frame, None if nothing is: a value, bytes, or a function that gives one."""
@@ -68,7 +70,7 @@ class Subscription:
     def __init__(self, sub: int, topic: Topic, hz: float) -> None:
         self.sub = sub
         self.topic = topic
-        self.pause_s = 1.0 / hz
+        self.pause_s = 1.0 / min(hz, topic.most_hz)
         self.due = 0.0
         self._sent = 0
         self._painted = 0

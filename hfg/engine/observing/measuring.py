@@ -100,7 +100,7 @@ class Measuring:
         self._before = self._marks
         for worker in self._workers():
             self._meter(worker)
-        engine.callbacks.pumped.append(self._pumped)
+        engine.callbacks.pumped.append(self.fold_due)
         engine.callbacks.finished.append(self._end)
         engine.callbacks.edited.append(self._refit)
         loop: Any = engine.loop
@@ -142,8 +142,8 @@ class Measuring:
         else:
             loop.watchers.remove(self._passed)
 
-    def _pumped(self) -> None:
-        """A slice of the pump is over: twenty times a second what was measured is summed up."""
+    def fold_due(self) -> None:
+        """Sum up what was measured, twenty times per second; also called when a slice of the pump is over."""
         if monotonic() >= self._fold_at:
             began = monotonic()
             for worker in self._workers():
@@ -228,10 +228,7 @@ class Measuring:
         engine = self._engine
         core = engine.core
         core.settle_barriers()
-        now = engine.now() if engine.ended_at is None else engine.ended_at
-        machine = (self._ended_on_machine or monotonic()) - self._began_on_machine
-        passed = now - self._began
-        over = now - self._before_at
+        passed, machine, over = self.spans()
         nodes: dict[str, NodeStatistics] = {}
         parts: dict[str, list[tuple[RunningNode, NodeStatistics, float]]] = {name: [] for name in engine.groups}
         for worker in self._workers():
@@ -240,7 +237,7 @@ class Measuring:
             parts.setdefault(worker.group.name, []).append((worker, node, busy))
         return Statistics(
             outcome=engine.outcome,
-            time=now,
+            time=self._began + passed,
             duration_s=engine.elapsed(),
             measured_s=passed,
             machine_s=machine,
@@ -251,6 +248,11 @@ class Measuring:
             lost_activity=core.lost_activity,
             errors=[str(error) for error in core.errors],
         )
+
+    def node(self, worker: RunningNode) -> NodeStatistics:
+        """Return what one node has done so far."""
+        self._engine.core.settle_barriers()
+        return self._node(worker, *self.spans())[0]
 
     def _node(self, worker: RunningNode, passed: float, machine: float, over: float) -> tuple[NodeStatistics, float]:
         meter = self.fold(worker)

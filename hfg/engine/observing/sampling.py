@@ -6,19 +6,22 @@ Depends on `measuring`.
 from __future__ import annotations
 
 from collections import deque
-from itertools import islice
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from hfg.engine.model.running_node import RunningNode
 from hfg.engine.observing.measuring import Measuring, doing
+from hfg.engine.observing.statistics import NodeStatistics
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.places import edges_at, place_of
 from hfg.graph import Edge
 
-__all__ = ["BARS", "Box", "Flow", "Sample", "Sampler"]
+__all__ = ["BARS", "Box", "Flow", "Load", "Sample", "Sampler"]
 
 BARS = 24
 """How many of the newest durations a sample has."""
+
+_PERCENTILES_S = 0.25
 
 
 class Sample(NamedTuple):
@@ -44,7 +47,7 @@ class Sample(NamedTuple):
     rate_hz: float
     active_share: float
     busy_share: float
-    newest_s: list[float]
+    newest_s: tuple[float, ...]
 
 
 class Box(NamedTuple):
@@ -62,40 +65,87 @@ class Flow(NamedTuple):
     untaken: int
 
 
+class Load(NamedTuple):
+    """One group: how many nodes, how many firings and calls per second, and the share of time it was busy."""
+
+    nodes: int
+    rate_hz: float
+    busy_share: float
+    queued: int
+
+
+class _Percentiles(NamedTuple):
+    at: float
+    p50_s: float
+    p99_s: float
+
+
 class Sampler:
-    """Samples one run. Times are measured from its first use on."""
+    """Samples one run. Times are measured from its first use on.
+
+    Call `settle` before several samples. A sample costs some microseconds: nothing is summed up for it beyond what the
+    statistics sum up anyway, and percentiles are computed four times per second at most.
+    """
 
     def __init__(self, engine: Engine, measuring: Measuring) -> None:
         self._engine = engine
         self._measuring = measuring
+        self._percentiles: dict[str, _Percentiles] = {}
+        self._spans = measuring.spans()
+
+    def settle(self) -> None:
+        """Sum up what was measured, if that is due; once before several samples."""
+        self._measuring.fold_due()
+        self._engine.core.settle_barriers()
+        self._spans = self._measuring.spans()
 
     def node(self, path: str) -> Sample | None:
         """Return how a node is; None if no node of this process has this path."""
-        worker = self._engine.core.by_path.get(path)
-        if worker is None or worker.type is None or worker.scope is not None:
+        worker = self._worker(path)
+        if worker is None or worker.meter is None:
             return None
-        measuring = self._measuring
-        meter = measuring.fold(worker)
-        p50_s, p99_s = meter.spent.percentiles()
-        passed_s, machine_s, over_s = measuring.spans()
-        newest = meter.spent.newest
+        meter, done = worker.meter, worker.counts.done
+        passed_s, machine_s, over_s = self._spans
+        known = self._percentiles.get(path)
+        if known is None or passed_s - known.at >= _PERCENTILES_S:
+            known = self._percentiles[path] = _Percentiles(passed_s, *meter.spent.percentiles())
         return Sample(
             doing=doing(worker),
             active=worker.active,
             failed=worker.counts.failed,
-            done=worker.counts.done,
-            p50_s=p50_s,
-            p99_s=p99_s,
-            rate_hz=(worker.counts.done - meter.before) / over_s if over_s > 0 else 0.0,
+            done=done,
+            p50_s=known.p50_s,
+            p99_s=known.p99_s,
+            rate_hz=(done - meter.before) / over_s if over_s > 0 else 0.0,
             active_share=min(1.0, meter.active / passed_s) if passed_s > 0 else 0.0,
             busy_share=min(1.0, meter.busy_s / machine_s) if machine_s > 0 else 0.0,
-            newest_s=list(islice(newest, max(0, len(newest) - BARS), None)),
+            newest_s=tuple(meter.spent.newest)[-BARS:],
         )
 
-    def settle(self) -> None:
-        """Count what fast paths have not counted yet; once before several samples."""
-        self._engine.core.settle_counts()
-        self._engine.core.settle_barriers()
+    def statistics(self, path: str) -> NodeStatistics | None:
+        """Return all that is measured of one node; None if no node of this process has this path."""
+        worker = self._worker(path)
+        return None if worker is None else self._measuring.node(worker)
+
+    def _worker(self, path: str) -> RunningNode | None:
+        worker = self._engine.core.by_path.get(path)
+        return None if worker is None or worker.type is None or worker.scope is not None else worker
+
+    def _workers(self) -> Iterator[RunningNode]:
+        return (one for one in self._engine.core.workers if one.type is not None and one.scope is None)
+
+    def loads(self) -> dict[str, Load]:
+        """Return how busy each group is, by name."""
+        _, machine_s, over_s = self._spans
+        found = dict.fromkeys(self._engine.groups, Load(0, 0.0, 0.0, 0))
+        for worker in self._workers():
+            meter, name = worker.meter, worker.group.name
+            so_far = found.get(name, Load(0, 0.0, 0.0, 0))
+            rate = 0.0 if meter is None or over_s <= 0 else (worker.counts.done - meter.before) / over_s
+            busy = 0.0 if meter is None or machine_s <= 0 else meter.busy_s / machine_s
+            nodes, queued = so_far.nodes + 1, so_far.queued + bool(worker.queued)
+            found[name] = Load(nodes, so_far.rate_hz + rate, so_far.busy_share + busy, queued)
+        return found
 
     def flow(self, edge: Edge) -> Flow | None:
         """Return how much has passed an edge as it is drawn; None if there is none in this process."""
@@ -114,5 +164,4 @@ class Sampler:
 
     def done(self) -> int:
         """Return how many firings and calls there were so far, measured or not."""
-        self.settle()
-        return sum(worker.counts.done for worker in self._engine.core.workers if worker.type is not None)
+        return sum(worker.counts.done for worker in self._workers())
