@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterable
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, cast
 
 import msgspec
 
 from hfg.base.logs import Log
-from hfg.graph import Graph
-from hfg.graph.drawing.picture import View, picture
-from hfg.graph.drawing.sheet import sheet
+from hfg.graph import Graph, drawing
+from hfg.graph.drawing import View
+from hfg.graph.drawing.picture import Kind
 from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.pointing import node_at
 from hfg.studio.tables import Tables
@@ -119,56 +119,7 @@ def lay_out(graph: Graph, path: str, view: str) -> dict[str, Any]:
     root = level_of(graph)
     level = root if not path else inside(node_at(root, path))
     assert level is not None
-    seen = picture(level.face, View(depth=0, all_ports=True))
-    drawn = sheet(seen)
-    places = positions(level)
-    boxes = []
-    for card in drawn.cards:
-        of = card.of
-        x, y = places.get(getattr(of, "path", ""), (card.x, card.y))
-        boxes.append(
-            {
-                "id": getattr(of, "path", "") or f"@{of.name}",
-                "name": of.name,
-                "kind": "subgraph" if getattr(of, "is_folded", False) else "node",
-                "type_name": of.type_name,
-                "group": of.group,
-                "x": x,
-                "y": y,
-                "width": card.width,
-                "height": card.height,
-                "is_state": getattr(of, "is_state", False),
-                "is_active": of.is_active,
-                "is_enabled": of.is_enabled,
-                "is_open": False,
-                "details": list(of.details),
-                "ports": [
-                    {"kind": m.kind, "name": m.name, "x": m.x - card.x + x, "y": m.y - card.y + y, "says": m.name}
-                    for m in card.marks
-                ],
-            }
-        )
-    _ = msgspec
-    return {
-        "title": seen.title,
-        "view": view or "all",
-        "width": drawn.width,
-        "height": drawn.height,
-        "nodes": boxes,
-        "lines": _lines(drawn),
-        "hidden": 0,
-    }
-
-
-def _lines(drawn: Any) -> list[dict[str, Any]]:
-    return [
-        {
-            "kind": "signal" if arrow.is_signal else "data",
-            "is_active": arrow.is_active,
-            "points": way,
-            "edges": [],
-            "says": arrow.said,
-        }
-        for lead in drawn.leads
-        for arrow, way in zip(lead.arrows, lead.ways, strict=True)
-    ]
+    kind = cast("Kind | None", view or None)
+    seen = View(kind, depth=0, all_ports=True, measured=True, places=positions(level))
+    drawn: dict[str, Any] = msgspec.to_builtins(drawing.lay_out(level.face, seen))
+    return drawn
