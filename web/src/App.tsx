@@ -15,6 +15,7 @@ import { TopBar } from "./shell/TopBar";
 import { useStudio } from "./state/studio";
 import { BottomPanel } from "./timeline/BottomPanel";
 import { applyTheme } from "./ui/colours";
+import { Guard } from "./ui/Guard";
 
 export function App() {
   const theme = useStudio((s) => s.theme);
@@ -38,12 +39,18 @@ export function App() {
         <>
           <div className="middle">
             <FileBar />
-            <Canvas />
+            <Guard of="The graph">
+              <Canvas />
+            </Guard>
             <Outline />
             <Toasts />
           </div>
-          <Inspector />
-          <BottomPanel />
+          <Guard of="The inspector">
+            <Inspector />
+          </Guard>
+          <Guard of="The timeline">
+            <BottomPanel />
+          </Guard>
         </>
       )}
       <StatusBar />

@@ -31,19 +31,20 @@ function Inner() {
   const layout = useStudio((s) => s.tables.layouts[layoutKey(s)]);
   const wiring = useStudio((s) => s.wire !== null);
   const spots = useMemo(() => (layout ? spotsOf(layout) : new Map()), [layout]);
-  const { nodes, moved, onNodesChange, onDragStart, onDragStop } = useNodes(layout);
+  const { nodes, moved, onNodesChange, onDragStart, onDrag, onDragStop } = useNodes(layout);
   const view = useView(root, layout);
   const events = useCanvasEvents(spots, layout);
   const classes = [view.level, wiring && "wiring", layout?.view === "activity" && "view-activity"];
   const rect = root.current?.getBoundingClientRect();
   return (
-    <main id="canvas" ref={root} className={classes.filter(Boolean).join(" ")} aria-label="Graph" {...events}>
+    <main id="canvas" ref={root} className={classes.filter(Boolean).join(" ")} aria-label="Graph" tabIndex={-1} {...events}>
       <ReactFlow
         nodes={nodes}
         edges={NO_EDGES}
         nodeTypes={NODE_TYPES}
         onNodesChange={onNodesChange}
         onNodeDragStart={onDragStart}
+        onNodeDrag={onDrag}
         onNodeDragStop={onDragStop}
         onSelectionDragStart={(event, dragged) => onDragStart(event, dragged[0]!, dragged)}
         onSelectionDragStop={(event, dragged) => onDragStop(event, dragged[0]!, dragged)}

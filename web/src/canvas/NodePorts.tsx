@@ -1,6 +1,5 @@
 import type { NodeBox, PortSpot } from "../protocol/types";
 import { useStudio } from "../state/studio";
-import { isBig } from "./NodeView";
 
 const SHAPES: Record<PortSpot["kind"], string> = {
   input: "sq",
@@ -23,13 +22,15 @@ export function NodePorts({ box, path, active }: Props) {
   return (
     <>
       {box.ports.map((port) => (
-        <Port key={`${port.kind}.${port.name}`} port={port} named={isBig(box)} x={port.x - box.x} y={port.y - box.y} node={path} active={active} />
+        <Port key={`${port.kind}.${port.name}`} port={port} x={port.x - box.x} y={port.y - box.y} node={path} active={active} />
       ))}
     </>
   );
 }
 
-/** In a node of one row, names at the sides would lie on its bars; the tooltip has them. */
+/** Names at the sides have room below the row of bars only; the tooltip has the others. */
+const BELOW_BARS = 58;
+
 const isSide = (port: PortSpot): boolean => port.kind === "input" || port.kind === "output" || port.kind === "parameter";
 
 interface PortProps {
@@ -38,17 +39,16 @@ interface PortProps {
   y: number;
   node: string;
   active: boolean;
-  named: boolean;
 }
 
-function Port({ port, x, y, node, active, named }: PortProps) {
+function Port({ port, x, y, node, active }: PortProps) {
   const path = `${node}.${port.name}`;
   const broken = useStudio((s) => path in s.tables.breakpoints);
   const shape = SHAPES[port.kind];
   const title = port.kind === "timeout" ? `time-out: hands the activity on after ${port.says}` : undefined;
   return (
     <>
-      {port.says !== "" && (named || !isSide(port)) && <PortName port={port} x={x} y={y} />}
+      {port.says !== "" && (y >= BELOW_BARS || !isSide(port)) && <PortName port={port} x={x} y={y} />}
       <i
         className={`port nodrag nopan ${shape}${port.kind === "timeout" && active ? " on" : ""}${broken ? " broken" : ""}`}
         style={{ left: x, top: y }}

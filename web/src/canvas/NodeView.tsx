@@ -21,7 +21,7 @@ export function rowsOf(box: NodeBox): { title: number; measure: number } {
     const title = slots ? 16 : 3;
     return { title, measure: title + 20 };
   }
-  return isBig(box) ? { title: 20, measure: box.height - 38 } : { title: 17, measure: 38 };
+  return { title: 17, measure: 38 };
 }
 
 function useLook(path: string) {

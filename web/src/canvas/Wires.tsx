@@ -10,7 +10,7 @@ export const keysOf = (line: LayoutLine): string[] => line.edges.map((edge) => e
 /** All lines of a level, exactly as the layout routes them: data below, activity above, its last way on top. */
 export function Wires({ layout, moved }: { layout: LayoutRecord; moved: ReadonlySet<string> }) {
   const ways = useStudio((s) => s.activity.ways);
-  const picked = useStudio((s) => s.selectedEdge);
+  const picked = useStudio((s) => s.insertAt ?? s.selectedEdge);
   const nodes = useStudio((s) => s.tables.nodes);
   const lines = layout.lines.filter((line) => !line.edges.some((e) => moved.has(nodeOf(e.source)) || moved.has(nodeOf(e.target))));
   const draw = (line: LayoutLine) => {
@@ -70,10 +70,10 @@ const Wire = memo(function Wire({ line, hot, picked, off, plain }: WireProps) {
           {(plain || pointsDown(line.points)) && !bundle && <path className={plain ? "tip sync" : "tip d"} d={tipOf(line.points)} />}
         </>
       )}
-      {line.combs.map((comb) => (
+      {(line.combs ?? []).map((comb) => (
         <path key={comb.join()} className={`wire thin ${line.kind === "signal" ? "sig" : "data"}`} d={rounded(comb, 0)} />
       ))}
-      {line.dots.map((dot) => (
+      {(line.dots ?? []).map((dot) => (
         <circle key={dot.join()} className={joint} cx={dot[0]} cy={dot[1]} r={line.is_active ? 4 : 3} />
       ))}
       {line.count_at && bundle && <Count at={line.count_at} count={line.edges.length} />}

@@ -3,6 +3,7 @@ import { useCallback, useEffect, useRef, useState } from "react";
 import type { LayoutRecord } from "../protocol/types";
 import { edit, newGesture, select } from "../state/actions";
 import { studio, useStudio } from "../state/studio";
+import { edgeUnder, insert, markEdgeUnder } from "./inserting";
 import type { HfgNode } from "./NodeView";
 
 const NOTHING: ReadonlySet<string> = new Set();
@@ -62,6 +63,12 @@ export function useNodes(layout: LayoutRecord | undefined) {
 
   const onDragStop = useCallback((_: unknown, __: HfgNode, dragged: HfgNode[]) => {
     dragging.current = false;
+    const edge = edgeUnder(layout, dragged);
+    if (edge) {
+      const node = dragged[0]!;
+      void insert(edge, node.id, [node.position.x, node.position.y]);
+      return;
+    }
     const gesture = newGesture();
     const commands = dragged.map((node) => ({
       do: "Note",
@@ -76,5 +83,7 @@ export function useNodes(layout: LayoutRecord | undefined) {
     });
   }, [layout]);
 
-  return { nodes, moved, onNodesChange, onDragStart, onDragStop };
+  const onDrag = useCallback((_: unknown, __: HfgNode, dragged: HfgNode[]) => markEdgeUnder(edgeUnder(layout, dragged)), [layout]);
+
+  return { nodes, moved, onNodesChange, onDragStart, onDrag, onDragStop };
 }

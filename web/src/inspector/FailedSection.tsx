@@ -27,9 +27,9 @@ export function FailedSection({ path }: { path: string }) {
         <div className="sec failed">
           <h3>
             <Icon name="error" />
-            Failed
+            Failed{error.what ? ` in ${error.what}` : ""}
           </h3>
-          <p style={{ margin: "4px 0" }}>{error.what || error.message}</p>
+          <p style={{ margin: "4px 0" }}>{error.message}</p>
           {error.remedy !== "" && <p className="second">{error.remedy}</p>}
         </div>
       )}
@@ -58,7 +58,7 @@ export function FailedSection({ path }: { path: string }) {
               Copy
             </button>
           </h3>
-          <div className="mono said">{error.message}</div>
+          <div className="mono said">{error.traceback || error.message}</div>
         </div>
       )}
     </>

@@ -28,15 +28,15 @@ export function NodeTypeDoc({ row, port }: { row: FoundRow; port: string }) {
       <p>{row.summary}</p>
       {type && (
         <>
-          {Object.entries(type.ports).map(([name, says]) => (
-            <div className="prt" key={name} style={{ gridTemplateColumns: "12px minmax(0, 1fr) auto" }}>
-              <i className={/^(slot|event)/.test(name) ? "ci" : "sq"} />
-              <span>
-                {name.slice(name.indexOf("/") + 1)}
-                <em>{says}</em>
+          {(type.ports ?? []).filter((one) => one.kind !== "parameter").map((one) => (
+            <div className="prt" key={`${one.kind}/${one.name}`} style={{ gridTemplateColumns: "12px minmax(0, 1fr) auto" }}>
+              <i className={one.kind === "slot" || one.kind === "event" ? "ci" : "sq"} />
+              <span title={type.docs[`${one.kind}/${one.name}`]}>
+                {one.name}
+                <em>{one.type}</em>
               </span>
               <span className="v" style={{ color: "var(--you)" }}>
-                {port !== "" && row.fit !== "refused" && row.port.endsWith(name.slice(name.indexOf("/") + 1)) ? "connects" : ""}
+                {port !== "" && row.fit !== "refused" && row.port === one.name ? "connects" : ""}
               </span>
             </div>
           ))}

@@ -1,6 +1,7 @@
 import { Palette } from "../palette/Palette";
 import { useStudio } from "../state/studio";
 import { Commands } from "./Commands";
+import { Connect } from "./Connect";
 import { Keys } from "./Keys";
 import { OpenFile } from "./OpenFile";
 import { Tour } from "./Tour";
@@ -11,6 +12,7 @@ export function Popovers() {
     <>
       <Palette />
       {popover === "commands" && <Commands />}
+      {popover === "connect" && <Connect />}
       {popover === "keys" && <Keys />}
       {popover === "open" && <OpenFile />}
       {popover === "tour" && <Tour />}

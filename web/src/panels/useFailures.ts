@@ -12,7 +12,7 @@ export function useFailures(): void {
     if (error === null || run === undefined) return;
     const action = error.path ? { action: { label: "Show node", act: () => show(error.path) } } : {};
     const title = run.state === "ended" ? `The run has failed at ${moment(run.elapsed_s)}.` : `${error.path} has failed.`;
-    toast(error.what || error.message, { kind: "bad", title, ...action }, 0);
+    toast(error.message, { kind: "bad", title, ...action }, 0);
     // Only a new failure counts, not each new record of the same run.
   }, [error?.message, number]);
 }

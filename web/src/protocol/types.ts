@@ -101,7 +101,10 @@ export interface TypeRecord {
   subgraph: boolean;
   source: string;
   parameters: ParameterType[];
-  ports: Record<string, string>;
+  /** Of its ports by "kind/name". */
+  docs: Record<string, string>;
+  /** Only of a type that was asked for by itself. */
+  ports?: { kind: PortKind; name: string; type: string }[];
 }
 
 export type Point = [number, number];

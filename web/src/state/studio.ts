@@ -5,7 +5,7 @@ import { EMPTY } from "./replica";
 export type View = "activity" | "mission" | "all";
 export type Tab = "timeline" | "problems" | "log" | "history";
 export type Panel = "outline" | null;
-export type Popover = "palette" | "commands" | "keys" | "tour" | "open" | null;
+export type Popover = "palette" | "commands" | "keys" | "tour" | "open" | "connect" | null;
 
 export interface Toast {
   id: number;
@@ -62,6 +62,8 @@ export interface Studio {
   palette: PaletteAt | null;
   menu: { x: number; y: number; path: string; kind: "node" | "edge" | "canvas" } | null;
   wire: WireDrag | null;
+  /** The edge that a dragged node would be put on. */
+  insertAt: string | null;
   renaming: string | null;
   side: boolean;
   time: boolean;
@@ -101,6 +103,7 @@ export const useStudio = create<Studio>()(() => ({
   palette: null,
   menu: null,
   wire: null,
+  insertAt: null,
   renaming: null,
   side: window.innerWidth > 1100,
   time: true,

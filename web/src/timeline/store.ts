@@ -8,6 +8,8 @@ interface Frame {
   boxes: Box[];
   now: number;
   lost: number;
+  /** What was active before the page came: in the first frame. */
+  activity?: Span[];
 }
 
 /** Boxes that are kept; the oldest go. Spans of activity are few and all stay. */
@@ -54,11 +56,23 @@ export function watchTimeline(number: number): () => void {
 }
 
 function heard(frame: Frame): void {
+  if (frame.activity) record.spans = joined(frame.activity, record.spans);
   for (const box of frame.boxes) record.boxes.push(box);
   if (record.boxes.length > MOST_BOXES) record.boxes = record.boxes.slice(-MOST_BOXES / 2);
   record.now = frame.now;
   record.turn++;
   measureLoads();
+}
+
+/** Both, once each: what the studio has kept, and what has begun since. */
+function joined(kept: Span[], own: Span[]): Span[] {
+  const begun = new Map(kept.map((span) => [`${span[0]} ${span[1].toFixed(3)}`, span]));
+  for (const span of own) {
+    const known = begun.get(`${span[0]} ${span[1].toFixed(3)}`);
+    if (!known) begun.set(`${span[0]} ${span[1].toFixed(3)}`, span);
+    else known[2] ??= span[2];
+  }
+  return [...begun.values()].sort((a, b) => a[1] - b[1]);
 }
 
 /** Spans of activity begin and end with its changes; what was active before the page came began when the studio says. */

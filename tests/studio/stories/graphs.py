@@ -1,0 +1,117 @@
+"""A small graph that runs for as long as somebody looks: numbers, a picture, and a mission of three states."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Iterator
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Ge, Interval
+
+import hfg
+from hfg.images import Gray
+
+__all__ = ["Collect", "Drive", "Errand", "Stamp", "count", "fails_at", "halves", "mission", "picture", "scaled"]
+
+
+@hfg.node
+def count() -> Iterator[int]:
+    """Count."""
+    yield from itertools.count()
+
+
+@hfg.node
+def scaled(value: int, *, factor: Annotated[int, Interval(ge=0, le=10)] = 2) -> int:
+    """Multiply a number."""
+    return value * factor
+
+
+@hfg.node
+def halves(value: int) -> int:
+    """Halve a number."""
+    return value // 2
+
+
+@hfg.node
+def picture(value: int) -> Gray:
+    """Draw a bright square on a dark ground."""
+    image = np.zeros((48, 64), np.uint8)
+    image[8:24, 8:24] = 200
+    return image
+
+
+@hfg.node
+def fails_at(value: int, *, limit: Annotated[int, Ge(0)] = 1_000_000_000) -> int:
+    """Fail once a number is too large."""
+    if value >= limit:
+        raise ValueError(f"{value} is too large")
+    return value
+
+
+class Collect(hfg.Node):
+    """Keep what was received last, and how much."""
+
+    last = hfg.State(-1)
+    seen = hfg.State(0)
+
+    def process(self, value: int) -> None:
+        """Keep it."""
+        self.last = value
+        self.seen += 1
+
+
+class Stamp(hfg.Node):
+    """Take words, never numbers."""
+
+    @hfg.slot
+    def write(self, words: str) -> None:
+        """Write them."""
+
+
+class Drive(hfg.Node):
+    """Be active for a while, then hand on."""
+
+    done = hfg.Event()
+    duration = hfg.Parameter(0.4, Interval(gt=0, le=10), unit="s")
+
+    @hfg.slot
+    async def begin(self) -> None:
+        """Drive."""
+        await asyncio.sleep(self.duration)
+        self.done.trigger()
+
+
+class Errand(hfg.Subgraph):
+    """Go there and come back."""
+
+    begin = hfg.slot(type=object)
+    done = hfg.Event()
+
+    def build(self, graph: hfg.Graph) -> None:
+        """Put one drive before the other."""
+        there = graph.add(Drive(), name="there")
+        back = graph.add(Drive(), name="back")
+        self.begin.inner.activates(there.begin)
+        there.done.activates(back.begin)
+        back.done.activates(self.done.inner)
+
+
+def mission() -> hfg.Graph:
+    """Data above, a mission of three states beside it."""
+    graph = hfg.Graph("mission")
+    numbers = graph.add(count(), name="numbers", max_rate_hz=25)
+    scale = graph.add(scaled(), name="scale")
+    check = graph.add(fails_at(), name="check")
+    store = graph.add(Collect(), name="store")
+    draw = graph.add(picture(), name="draw")
+    graph.add(Stamp(), name="stamp")
+    graph.add(Collect(), name="spare")
+    numbers >> scale >> check >> store
+    numbers >> draw
+    errand, rest = graph.add(Errand(), name="errand"), graph.add(Drive(), name="rest")
+    graph.start.activates(errand.begin)
+    errand.done.activates(rest.begin)
+    rest.done.activates(errand.begin)
+    return graph

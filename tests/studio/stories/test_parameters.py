@@ -1,0 +1,70 @@
+"""A person changes parameters while the graph runs; the studio decides what is allowed."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import Locator, expect
+
+from tests.studio.stories.bench import Story
+
+pytestmark = pytest.mark.slow
+
+
+def field(story: Story, name: str) -> Locator:
+    return story.page.locator("#side").get_by_label(name, exact=True)
+
+
+def test_a_typed_value_applies_at_once(story: Story) -> None:
+    story.start()
+    story.select("scale")
+    field(story, "factor").fill("5")
+    story.press("Enter")
+    story.bench.until(lambda: story.graph["scale"].factor == 5)
+    story.bench.until(lambda: story.graph["store"].last % 5 == 0 and story.graph["store"].last > 0)
+    expect(field(story, "factor")).to_have_value("5")
+
+
+def test_keys_move_a_value_by_steps_and_undo_takes_it_back(story: Story) -> None:
+    story.select("scale")
+    field(story, "factor").click()
+    story.press("ArrowUp")
+    story.bench.until(lambda: story.graph["scale"].factor == 3)
+    story.press("Escape")
+    story.page.locator("#canvas").click(position={"x": 300, "y": 20})
+    story.press("Control+z")
+    story.bench.until(lambda: story.graph["scale"].factor == 2)
+
+
+def test_a_drag_is_one_step_of_the_history(story: Story) -> None:
+    story.start()
+    story.select("scale")
+    box = story.page.locator('[data-slider="factor"]').bounding_box()
+    assert box is not None
+    mouse = story.page.mouse
+    mouse.move(box["x"] + box["width"] * 0.2, box["y"] + 8)
+    mouse.down()
+    mouse.move(box["x"] + box["width"] * 0.9, box["y"] + 8, steps=12)
+    mouse.up()
+    story.bench.until(lambda: story.graph["scale"].factor == 9)
+    done = story.bench.call(lambda: len(story.bench.studio.tables.of["studio"]["history"].done))
+    assert done == 1
+    story.press("Control+z")
+    story.bench.until(lambda: story.graph["scale"].factor == 2)
+
+
+def test_a_value_out_of_its_limits_is_refused_in_the_words_of_the_engine(story: Story) -> None:
+    story.select("scale")
+    field(story, "factor").fill("11")
+    story.press("Enter")
+    expect(story.page.locator(".par-note")).to_contain_text("10")
+    expect(story.page.locator(".par-note")).to_contain_text("It stays at 2")
+    assert story.bench.node("scale").factor == 2
+
+
+def test_a_double_click_on_the_name_resets_a_value(story: Story) -> None:
+    story.select("scale")
+    field(story, "factor").fill("7")
+    story.press("Enter")
+    story.bench.until(lambda: story.graph["scale"].factor == 7)
+    story.page.locator("#side label", has_text="factor").dblclick()
+    story.bench.until(lambda: story.graph["scale"].factor == 2)

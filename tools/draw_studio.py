@@ -1,0 +1,98 @@
+"""Take the pictures of the studio in docs from the page itself, with the delivery robot on it.
+
+    make docs-studio
+
+This needs Chromium, and the package playwright of the extra test. Run it after you have changed the page.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDER = ROOT / "docs" / "pictures" / "studio"
+ROBOT = "examples.fetch_delivery.mission:build"
+WINDOW = {"width": 1440, "height": 900}
+START_S = 60.0
+
+
+def _settle(page: Page) -> None:
+    page.wait_for_timeout(1500)
+
+
+def _mission(page: Page) -> None:
+    """The mission at work, with a node of it in the inspector."""
+    page.locator('[data-node="robot_0"]').dblclick(position={"x": 20, "y": 28})
+    page.locator('[data-node="robot_0/fetch"].active').wait_for(timeout=1000 * START_S)
+    page.locator('[data-node="robot_0/advance"] .t b').click()
+
+
+def _inside(page: Page) -> None:
+    """One level deeper."""
+    page.locator('[data-node="robot_0/fetch"] .t b').dblclick()
+    page.locator('[data-node="robot_0/fetch/visit"]').wait_for()
+    page.locator('[data-node="robot_0/fetch/visit"] .t b').dblclick()
+    page.locator('[data-node="robot_0/fetch/visit/position"] .t b').click()
+
+
+def _palette(page: Page) -> None:
+    """What can be added, where one clicks twice."""
+    page.keyboard.press("Backspace")
+    page.keyboard.press("Backspace")
+    page.locator('[data-node="robot_0/fetch"]').wait_for()
+    page.keyboard.press("Tab")
+    page.keyboard.type("thresh")
+    page.locator(".palette li.sel").wait_for()
+
+
+def _wire(page: Page) -> None:
+    """What a wire may lead to."""
+    page.keyboard.press("Escape")
+    box = page.locator('[data-port="robot_0/advance.command"]').bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 4, box["y"] + 4)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 90, box["y"] + 50, steps=4)
+    page.locator(".dragline .num").first.wait_for()
+
+
+PICTURES: dict[str, Callable[[Page], None]] = {"mission": _mission, "inside": _inside, "palette": _palette, "wire": _wire}
+
+
+def main() -> None:
+    """Start the studio on the robot, and take each picture in light and dark."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        sys.exit("this needs Chromium on the path")
+    from playwright.sync_api import sync_playwright
+
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    command = [sys.executable, "-m", "hfg", "studio", ROBOT, "--no-browser", "--run"]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as studio, sync_playwright() as tool:
+        try:
+            assert studio.stdout is not None
+            found = next(one for line in studio.stdout if (one := re.search(r"http://\S+", line)))
+            with tool.chromium.launch(executable_path=browser, args=["--no-sandbox", "--disable-gpu"]) as started:
+                page = started.new_page(viewport=WINDOW, color_scheme="light", device_scale_factor=1.5)
+                page.goto(found[0])
+                for name, act in PICTURES.items():
+                    act(page)
+                    for theme in ("light", "dark"):
+                        page.evaluate("theme => { document.documentElement.dataset.theme = theme }", theme)
+                        _settle(page)
+                        page.screenshot(path=FOLDER / f"{name}-{theme}.png")
+        finally:
+            studio.terminate()
+
+
+if __name__ == "__main__":
+    main()
