@@ -65,7 +65,12 @@ def _wire(page: Page) -> None:
     page.locator(".dragline .num").first.wait_for()
 
 
-PICTURES: dict[str, Callable[[Page], None]] = {"mission": _mission, "inside": _inside, "palette": _palette, "wire": _wire}
+PICTURES: dict[str, Callable[[Page], None]] = {
+    "mission": _mission,
+    "inside": _inside,
+    "palette": _palette,
+    "wire": _wire,
+}
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""A studio with a page in a real browser: what the person does is done there, what is asserted is asked of the engine."""
+"""A studio with a page in a real browser: the person acts there, and the engine is asked what it then does."""
 
 from __future__ import annotations
 
