@@ -120,6 +120,7 @@ def lay_out(graph: Graph, path: str, view: str) -> dict[str, Any]:
     level = root if not path else inside(node_at(root, path))
     assert level is not None
     kind = cast("Kind | None", view or None)
-    seen = View(kind, depth=0, all_ports=True, measured=True, places=positions(level))
+    places = positions(level)
+    seen = View(kind, depth=0, all_ports=True, measured=True, places=places)
     drawn: dict[str, Any] = msgspec.to_builtins(drawing.lay_out(level.face, seen))
-    return drawn
+    return {**drawn, "level": path, "fixed": list(places)}

@@ -1,4 +1,4 @@
-"""Carries out the requests of pages and returns the answers. Depends on `steering`, `project`, `asking`."""
+"""Carries out the requests of pages and returns the answers. Depends on `following` and `asking`."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The studio: one graph, its runs, its file, and all pages that look at it. Everything happens on the graph's loop.
 
-`requests` carries out the requests of pages. Depends on `steering`, `project`, `tables`, `viewing` and `topics`.
+`requests` carries out the requests of pages. Depends on `steering`, `project`, `following`, `viewing` and `topics`.
 """
 
 from __future__ import annotations

@@ -508,3 +508,39 @@ def test_a_type_is_described_with_its_widgets() -> None:
         assert answer["code"] == "refused"
 
     live(main)
+
+
+# --- layout ---
+
+
+def test_a_level_that_a_page_shows_is_laid_out_and_follows_edits() -> None:
+    async def main() -> None:
+        page = Page(studio_of(doubling()), levels=[""]).join()
+        await page.until(lambda: ":" in page.tables["layouts"])
+        layout = page.tables["layouts"][":"]
+        assert {node["id"] for node in layout["nodes"]} == {"source", "scaled"}
+        assert layout["lines"][0]["edges"][0]["label"] == "source.out -> scaled.value"
+        note = {"do": "Note", "path": "scaled", "name": "position", "value": [800, 160]}
+        await page.edit(note)
+        await page.until(lambda: page.tables["layouts"][":"]["fixed"] == ["scaled"])
+        (scaled,) = [node for node in page.tables["layouts"][":"]["nodes"] if node["id"] == "scaled"]
+        assert (scaled["x"], scaled["y"]) == (800, 160)
+        page.say(t="level", path="", open=False)
+        assert page.tables["layouts"] == {}
+
+    live(main)
+
+
+def test_each_view_of_a_subgraph_is_a_layout_of_its_own() -> None:
+    async def main() -> None:
+        graph = doubling()
+        graph.edit(hfg.commands.Enclose(("scaled",), "box"))
+        page = Page(studio_of(graph)).join()
+        page.say(t="level", path="box", view="all")
+        page.say(t="level", path="gone")
+        await page.until(lambda: "all:box" in page.tables["layouts"])
+        assert {node["id"] for node in page.tables["layouts"]["all:box"]["nodes"]} == {"box/scaled"}
+        await page.edit({"do": "Dissolve", "path": "box"})
+        await page.until(lambda: "all:box" not in page.tables["layouts"])
+
+    live(main)
