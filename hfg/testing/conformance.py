@@ -15,8 +15,8 @@ from typing import Any, Final
 from hfg.base.token import END, Token
 from hfg.errors import Failure, shown
 from hfg.testing.reference import Move, ReferenceMachine
-from hfg.testing.reference.machine import TEARDOWN_LIMIT_S
 from hfg.testing.reference.state import Task
+from hfg.testing.reference.waiting import TEARDOWN_LIMIT_S
 from hfg.trace import (
     ActivityChanged,
     ActivityLost,

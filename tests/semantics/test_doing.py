@@ -701,3 +701,77 @@ def test_in_another_process_it_is_as_here() -> None:
     assert activity(events, "node") == [True, False]
     assert activity(events, "ear") == [True]
     assert begun_and_ended(events) == [(0, "DoStarted"), (1, "DoEnded")]
+
+
+# --- one that does not end
+
+
+LEFT = 'node "node" failed in do(): it was cancelled and did not end within 5 s'
+
+
+@pytest.mark.rule("A15", "X3", "R5")
+def test_one_that_does_not_end_is_left_behind_and_the_next_begins(caplog: pytest.LogCaptureFixture) -> None:
+    async def stays_once(node: Busy) -> str:
+        if len([what for _, what in node.story if what == "begins"]) > 1:
+            return "well done"
+        try:
+            await stays(node)
+        finally:
+            node.say("closed")
+        return ""
+
+    def build() -> tuple[hfg.Graph, Busy]:
+        graph, node, _ = doing(stays_once, (1, "on"), (2, "off"), (3, "on"))
+        return graph, node
+
+    graph, node = build()
+    events: list[TraceEvent] = []
+    report = run(graph, trace=events)
+    assert report.outcome == "done"
+    assert report.errors == [LEFT]
+    assert begun_and_ended(events) == [(1, "DoStarted"), (7, "DoEnded"), (7, "DoStarted"), (7, "DoEnded")]
+    assert [event.outcome for event in of_kind(events, DoEnded)] == ["cancelled", "completed"]
+    assert (7, "closed") in node.story
+    (said,) = [one.getMessage() for one in caplog.records if one.levelname == "ERROR"]
+    assert said == f"{LEFT}; it is left behind: do not catch CancelledError, or raise it again after cleaning up"
+    replay(lambda: build()[0], events)
+
+
+@pytest.mark.rule("A15", "F10", "X3")
+@pytest.mark.parametrize("what", ["disable_it", "reset_it"])
+def test_a_node_is_switched_off_or_reset_though_its_activity_does_not_end(what: str) -> None:
+    def build() -> tuple[hfg.Graph, Busy]:
+        graph, node, _ = doing(stays, (1, "on"), (2, what), (9, "off"))
+        return graph, node
+
+    graph, node = build()
+    events: list[TraceEvent] = []
+    report = run(graph, trace=events)
+    assert report.errors[0] == LEFT
+    assert begun_and_ended(events)[1] == (7, "DoEnded")
+    assert node.story[0] == ((7, "setup") if what == "reset_it" else (0, "setup"))
+    replay(lambda: build()[0], events)
+
+
+@pytest.mark.rule("A15", "R4", "X3")
+def test_an_edit_that_removes_a_node_ends_though_its_activity_does_not() -> None:
+    graph, node, _ = doing(stays, (1, "on"))
+
+    async def main() -> tuple[float, hfg.Report]:
+        async with hfg.running(graph) as running:
+            await asyncio.sleep(2)
+            await running.edit(commands.Remove("node"))
+            over = running.elapsed()
+            await running.wait_finished()
+        return over, running.report()
+
+    over, report = drive(main)
+    assert over == 7
+    assert report.errors == [LEFT]
+    assert node.story[-1] == (7, "teardown")
+
+
+@pytest.mark.rule("A15", "X3")
+def test_one_that_ends_in_time_is_no_error() -> None:
+    graph, _, _ = doing(resists, (1, "on"), (2, "off"), (30, "on"), (31, "off"))
+    assert run(graph).errors == []

@@ -7,6 +7,7 @@ from here.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import enum
 from collections.abc import Iterator
 from pathlib import Path, PosixPath
@@ -854,7 +855,7 @@ class Works(hfg.Node):
             case "fails":
                 await asyncio.sleep(self.pause_s)
                 raise ValueError(f"cannot do it for the {self.begun}. time")
-            case "resists" | "clings":
+            case "resists" | "clings" | "stays":
                 await self._resist()
             case "long":
                 await asyncio.sleep(0.3)
@@ -868,6 +869,9 @@ class Works(hfg.Node):
             self.told.trigger(100 + int(self.active))
             if self.manner == "resists":
                 raise
+            while self.manner == "stays":
+                with contextlib.suppress(asyncio.CancelledError):
+                    await asyncio.sleep(1.0)
 
 
 class Gate(hfg.Node):

@@ -291,7 +291,7 @@ class Wide(Making):
                 return {"pause_s": choose.one_of([0.003, 0.01])}
             case "Works":
                 manners = ["at once", "later", "tells", "fails", "long"]
-                manners += ["resists", "clings"] if self.allowed.clinging else []
+                manners += ["resists", "clings", "stays"] if self.allowed.clinging else []
                 return {"manner": choose.one_of(manners), "pause_s": choose.one_of([0.003, 0.01])}
             case "Unsteady":
                 return {"pause_s": choose.one_of([0.0, 0.003, 0.01])}

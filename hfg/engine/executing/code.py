@@ -101,7 +101,7 @@ class CodeRunner:
         self.loop = loop
         self.context = context
         self.given_up: set[AnyEagerTask] = set()
-        self.aside: set[asyncio.Task[None]] = set()
+        self.aside: dict[EagerTask, tuple[RunningNode, str]] = {}  # hooks that wait
         self.came_back = asyncio.Event()
         self.holds = 0
         self._early_signals: dict[int, list[Callable[[], None]]] = {}
@@ -350,23 +350,48 @@ class CodeRunner:
             return
         self.core.begin_async()
 
-        async def aside() -> None:
-            error: BaseException | None = None
-            try:
-                await result
-            except KeyboardInterrupt:
-                raise
-            except BaseException as problem:
-                error = problem
-            finally:
-                self.core.end_async()
-            if not self.core.over:
+        eager_task = EagerTask(
+            self.loop, f"hfg {worker.path}", self.context, self.context.copy(), self._engine.give_way
+        )
+        self.aside[eager_task] = (worker, getattr(call, "__name__", "its hook"))
+
+        def over(_result: object, error: BaseException | None) -> None:
+            del self.aside[eager_task]
+            eager_task.drop()
+            self.core.end_async()
+            if self.core.over:
+                self.came_back.set()
+            else:
                 done(None, error)
                 self._engine.kick()
 
-        task = self.loop.create_task(aside(), context=self.context)
-        self.aside.add(task)
-        task.add_done_callback(self.aside.discard)
+        self.loop.call_soon(partial(self._begin_aside, eager_task, result, over), context=self.context)
+
+    def _begin_aside(self, eager_task: EagerTask, coroutine: Any, over: Done) -> None:
+        """Take the first step of a hook that may wait; after the end of the run none begins."""
+        if self.core.over:
+            coroutine.close()
+            if eager_task in self.aside:  # else it was left behind
+                over(None, None)
+            return
+        try:
+            result = eager_task.start(coroutine, over)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            over(None, error)
+        else:
+            if result is not PENDING:
+                over(result, None)
+
+    def leave_aside(self) -> list[tuple[RunningNode, str]]:
+        """Wait no longer for hooks that do not end; return their nodes and names."""
+        left = list(self.aside.values())
+        for eager_task in self.aside:
+            eager_task.drop()
+            self.core.end_async()
+        self.aside.clear()
+        return left
 
     async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
         """Trigger, then wait until no `wait` queue behind the node's events is full (F8).

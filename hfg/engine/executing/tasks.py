@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from hfg.base.clock import current_clock, current_elapsed
-from hfg.base.logs import current_log
+from hfg.base.logs import current_log, node_log
 from hfg.engine.executing.code import CodeRunner, run_as
 from hfg.engine.executing.eager_task import EagerTask
 from hfg.engine.model import Core, Doing, Task
@@ -148,6 +148,21 @@ class TaskRunner:
         finally:
             core.current = None
 
+    def limit(self, task: Task, limit_s: float) -> None:
+        """Leave a cancelled task behind if it takes longer; at the end of a run one limit holds for all (X3)."""
+        if task in self.under_way and not self._core.over:
+            task.limit = self._core.after(limit_s, partial(self._give_up, task, limit_s))
+
+    def _give_up(self, task: Task, limit_s: float) -> None:
+        """It resists: its code runs no further, its node does not wait for it, and the report names it."""
+        words = f"it was cancelled and did not end within {limit_s:g} s"
+        problem = NodeError(task.worker.path, task.what, words)
+        self._core.errors.append(problem)
+        node_log(task.worker.path).error(
+            "%s; it is left behind: do not catch CancelledError, or raise it again after cleaning up", problem
+        )
+        self._end(task, None, None)
+
     def _over(self, task: Task, result: object, error: BaseException | None) -> None:
         """It has come to its end."""
         self._core.current = None
@@ -161,6 +176,8 @@ class TaskRunner:
     def _end(self, task: Task, result: object, error: BaseException | None) -> None:
         worker = task.worker
         del self.under_way[task]
+        if task.limit is not None:
+            task.limit.cancel()
         if task.eager_task is None:
             task.coroutine.close()
         else:

@@ -62,6 +62,8 @@ class _Counts(Protocol):
 
     def end_async(self) -> None: ...
 
+    def limit_task(self, task: Any) -> None: ...  # noqa: ANN401 (a type of a module above)
+
 
 class _Watched(Protocol):
     def notify_watchers(self) -> None: ...

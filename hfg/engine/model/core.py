@@ -20,7 +20,7 @@ from hfg.engine.model.contracts import NodeT, Timer
 from hfg.engine.model.events import RunningEvent
 from hfg.engine.model.iteration import Iteration
 from hfg.engine.model.scopes import Gate, Scope
-from hfg.engine.model.tasks import Doing
+from hfg.engine.model.tasks import Doing, Task
 from hfg.errors import HfgError
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.ports.events import EventPort
@@ -138,6 +138,13 @@ class Runtime(Protocol[NodeT]):
 
     def start_task(self, worker: NodeT, coroutine: Coroutine[Any, Any, Any], doing: Doing[NodeT] | None = None) -> None:
         """Start a task, a child of the node: its code has asked for it, or it is the node's do-activity (A15)."""
+
+    @property
+    def teardown_limit_s(self) -> float:
+        """How long code may take to end once it is cancelled, and each teardown (X3)."""
+
+    def limit_task(self, task: Task[NodeT]) -> None:
+        """A task was cancelled: if it does not end in time while the run continues, it is left behind (X3)."""
 
     def on_loop(self) -> bool:
         """Whether the caller is on the run's own thread."""
@@ -400,6 +407,10 @@ class Core(Generic[NodeT]):
     def number_node(self) -> int:
         """Return a number that no node of this run has yet."""
         return next(self._numbers)
+
+    def limit_task(self, task: Task[NodeT]) -> None:
+        """See `Host`."""
+        self.runtime.limit_task(task)
 
     def after(self, delay_s: float, callback: Callable[[], None]) -> Timer:
         """Call back `delay_s` seconds from now."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import Any, Generic
 
-from hfg.engine.model.contracts import EagerTask, NodeT
+from hfg.engine.model.contracts import EagerTask, NodeT, Timer
 from hfg.errors import NodeError
 
 __all__ = ["Doing", "Task", "Tasks"]
@@ -25,6 +25,7 @@ class Task(Generic[NodeT]):
     coroutine: Coroutine[Any, Any, Any]
     doing: Doing[NodeT] | None = None  # of a do-activity
     eager_task: EagerTask | None = None  # runs it once it has started
+    limit: Timer | None = None  # it is left behind when this is over (X3)
     cancelled: bool = False  # by a teardown, by disabling, by the end of the run, or a do-activity by that of A(v)
 
     @property
@@ -42,9 +43,12 @@ class Task(Generic[NodeT]):
 
     def cancel(self) -> None:
         """Cancel it where it waits, or before it starts."""
+        first = not self.cancelled
         self.cancelled = True
         if self.eager_task is not None:
             self.eager_task.cancel()
+            if first:
+                self.worker.core.limit_task(self)
 
 
 @dataclass(slots=True, eq=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any
 
+from hfg.engine.model.contracts import Timer
 from hfg.engine.model.running_node import BACKOFF, BETWEEN_FIRINGS, DISABLED, ENDED, REMOVED, TORN_DOWN, RunningNode
 from hfg.engine.rules import doing, wiring
 from hfg.engine.rules.agenda import consider, unblock
@@ -80,6 +81,29 @@ def _run_hook(worker: RunningNode, name: str, then: Then) -> None:
     worker.core.code.execute(worker, hook, (), done)
 
 
+def _run_teardown(worker: RunningNode, then: Then) -> None:
+    """Run `teardown()`; while the run continues, a limit ends it, as at the end of the run its caller does (X3)."""
+    core = worker.core
+    over = False
+    timer: Timer | None = None
+
+    def done(error: NodeError | None) -> None:
+        nonlocal over
+        over = True
+        if timer is not None:
+            timer.cancel()
+        then(error)
+
+    def give_up() -> None:
+        core.code.interrupt(worker)
+        done(NodeError(worker.path, "teardown()", f"it took longer than {limit_s:g} s and was given up"))
+
+    _run_hook(worker, "teardown", lambda error: None if over else done(error))
+    if not over and not core.over:
+        limit_s = core.runtime.teardown_limit_s
+        timer = core.after(limit_s, give_up)
+
+
 def set_up(worker: RunningNode, then: Then) -> None:
     """Give the node fresh state and run its `setup()`; `then(error)` follows."""
     if worker.node is None:
@@ -145,7 +169,7 @@ def tear_down(worker: RunningNode, then: Then) -> None:
         if error is not None:
             problem = NodeError(worker.path, "closing its generator", error)
             problem.__cause__ = error
-        _run_hook(worker, "teardown", then if problem is None else lambda later: then(later or problem))
+        _run_teardown(worker, then if problem is None else lambda later: then(later or problem))
 
     close = getattr(generator, "close", None) or getattr(generator, "aclose", None)
     if close is None:  # none, or an iterator that has nothing to close

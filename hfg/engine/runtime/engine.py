@@ -21,7 +21,7 @@ from hfg.engine.executing.code import CodeRunner, answer
 from hfg.engine.executing.groups import CheckedTurn, Dispatching, LoopGroup, SideGroup, ThreadGroup
 from hfg.engine.executing.tasks import TaskRunner
 from hfg.engine.executing.virtual import VirtualTimeLoop
-from hfg.engine.model import Core, Doing, Group, RunningNode
+from hfg.engine.model import Core, Doing, Group, RunningNode, Task
 from hfg.engine.model.invariants import check_invariants
 from hfg.engine.model.policies import make_policy
 from hfg.engine.model.sharing import Sharing
@@ -219,6 +219,15 @@ class Engine:
     def start_task(self, worker: RunningNode, coroutine: Coroutine[Any, Any, Any], doing: Doing | None = None) -> None:
         """See `Host`."""
         self.tasks.start(worker, coroutine, doing)
+
+    @property
+    def teardown_limit_s(self) -> float:
+        """See `Host`."""
+        return self.settings.teardown_limit_s
+
+    def limit_task(self, task: Task) -> None:
+        """See `Host`."""
+        self.tasks.limit(task, self.teardown_limit_s)
 
     # --- groups -----------------------------------------------------------------------------------------------------
 

@@ -355,21 +355,24 @@ class RunLifecycle:
             firing.end_attempt()
             if firing.eager_task is not None:
                 firing.eager_task.cancel()
-        for task in code.aside:
-            task.cancel()
+        for hook in list(code.aside):
+            hook.cancel()
         tasks = self._engine.tasks
         tasks.cancel_all()
         begun = time.monotonic()
-        if busy or concurrent or tasks.under_way:
+        if busy or concurrent or tasks.under_way or code.aside:
             await self._until_back(
                 lambda: (
-                    bool(tasks.under_way)
+                    bool(tasks.under_way or code.aside)
                     or any(worker.execution.in_flight for worker in busy)
                     or _any_works(concurrent)
                 )
             )
         seconds = time.monotonic() - begun
         self._of_tasks = tasks.leave_behind(seconds)
+        self._of_tasks += [
+            NodeError(worker.path, f"{hook}()", _did_not_end(worker, seconds)) for worker, hook in code.leave_aside()
+        ]
         late = [firing for firing in concurrent if firing.working]
         return self._leave_behind([worker for worker in busy if worker.execution.in_flight], late, seconds)
 

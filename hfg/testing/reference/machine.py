@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Set
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.errors import QueueLimit, Stalled, UsageError
 from hfg.testing.reference.rings import Rings
 from hfg.testing.reference.state import Flight, Line, Station, Task
 from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of
-from hfg.testing.reference.waiting import MOMENT_S
+from hfg.testing.reference.waiting import MOMENT_S, TEARDOWN_LIMIT_S
 from hfg.trace import (
     ActivityChanged,
     QueueGrown,
@@ -27,10 +27,7 @@ from hfg.trace import (
     TraceEvent,
 )
 
-__all__ = ["TEARDOWN_LIMIT_S", "Move", "ReferenceMachine"]
-
-TEARDOWN_LIMIT_S: Final = 5.0
-"""What a node's teardown may take (X3), unless a run is told otherwise."""
+__all__ = ["Move", "ReferenceMachine"]
 
 
 @dataclass(frozen=True)
@@ -366,6 +363,7 @@ class ReferenceMachine(Rings):
             if station.resting_until is not None:
                 times.append(station.resting_until)
             times += [flight.pause_until for flight in station.flights]
+            times += [task.limit for task in station.tasks]
             if not station.is_busy and station.place is None and self.may_fire(index, ignore="timers and queues"):
                 rests = [station.hold_until]
                 rests += [
@@ -511,6 +509,8 @@ class ReferenceMachine(Rings):
         for index, station in enumerate(self.stations):
             if self.times_out(index) or (station.resting_until is not None and self.is_over(station.resting_until)):
                 found.append(Move("timer", station.path))
+            late = [task for task in station.tasks if task.limit is not None and self.is_over(task.limit)]
+            found += [Move("timer", station.path, number=task.number) for task in late]
         found += [Move("timer", box.path) for box in self.structure.boxes if self.times_out(-2 - box.index)]
         for line in self.lines:
             if line.operators is not None and (due := line.operators.due()) is not None and self.is_over(due):
@@ -536,6 +536,8 @@ class ReferenceMachine(Rings):
         """Do what a timer was set for."""
         if move.edge:
             self.labels[move.edge].operators.advance(self.now)
+        elif move.number:
+            self.leave_behind(self.task_of(move))
         else:
             owner = self.paths[move.node]
             if self.times_out(owner):

@@ -121,6 +121,7 @@ class Task:
     waiting_for: str = ""  # an event whose queues have no room (trigger_wait)
     is_activity: bool = False  # the node's own do-activity (A15)
     stepped: bool = False  # its code has begun
+    limit: float | None = None  # when it is left behind if it resists being cancelled (X3)
 
 
 @dataclass(eq=False)

@@ -7,12 +7,14 @@ down. Its steps are moves of their own, one task after another in the order in w
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Coroutine
 from typing import Any
 
 from hfg.errors import Failure, NodeError, NotRunning, QueueOverflow, UsageError
 from hfg.testing.reference.firing import Firing
 from hfg.testing.reference.state import Station, Task
+from hfg.testing.reference.waiting import TEARDOWN_LIMIT_S
 from hfg.trace import DoEnded, DoStarted, ErrorRaised
 
 __all__ = ["Tending"]
@@ -75,7 +77,7 @@ class Tending(Firing):
         station.tasks.remove(task)
         self.loop.forget(task)
         cancelled = task.code.cancelled()
-        error: BaseException | None = None if cancelled else task.code.exception()
+        error: BaseException | None = None if cancelled or not task.code.done() else task.code.exception()
         if task.is_activity:
             error = self.end_activity(task, asyncio.CancelledError() if cancelled and not task.cancelled else error)
         if error is not None:
@@ -113,9 +115,7 @@ class Tending(Firing):
         station.is_to_do = station.active
         doing = self.activity_of(station)
         if not station.active and doing is not None and not doing.cancelled:
-            doing.cancelled = True
-            with self.amid_code():
-                doing.code.cancel()
+            self.cancel_task(doing)
         if not station.active and doing is not None:
             station.node._outdated = lambda: self.in_task is doing
         self.begin_to_do(station)
@@ -167,9 +167,20 @@ class Tending(Firing):
         """Let all of them end, each by its next step."""
         for task in station.tasks:
             if not task.cancelled:
-                task.cancelled = True
-                with self.amid_code():
-                    task.code.cancel()
+                self.cancel_task(task)
+
+    def cancel_task(self, task: Task) -> None:
+        """Let it end, at its next step or within its time limit (X3)."""
+        task.cancelled = True
+        task.limit = self.now + TEARDOWN_LIMIT_S
+        with self.amid_code():
+            task.code.cancel()
+
+    def leave_behind(self, task: Task) -> None:
+        """X3: it has resisted for too long, so its code runs no further."""
+        with self.amid_code(), contextlib.suppress(RuntimeError):
+            task.code.get_coro().close()
+        self.end_task(task)
 
     def abandon_tasks(self, station: Station) -> bool:
         """Let them end now; whether each has done so, and without an error."""

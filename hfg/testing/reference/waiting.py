@@ -15,10 +15,13 @@ from contextlib import contextmanager
 from contextvars import Context, ContextVar, copy_context
 from typing import Any, Final
 
-__all__ = ["MOMENT_S", "HandTurnedLoop", "hand_turned_loop"]
+__all__ = ["MOMENT_S", "TEARDOWN_LIMIT_S", "HandTurnedLoop", "hand_turned_loop"]
 
 MOMENT_S: Final = 1e-9
 """Sums of floats that differ by less are the same moment."""
+
+TEARDOWN_LIMIT_S: Final = 5.0
+"""How long code may take to end once it is cancelled, and each teardown (X3)."""
 
 _OWNER: Final[ContextVar[object]] = ContextVar("hfg.testing.owner", default=None)
 
