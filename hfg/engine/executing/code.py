@@ -149,6 +149,8 @@ class CodeRunner:
             return
         if firing is None:
             worker.begin_async()
+            if worker.busy == "call" and worker.region is not None:
+                worker.region.disturb(worker)  # which takes for granted that calls of its members are over at once
         else:
             firing.work(eager_task=eager_task)
         self._limit(worker, firing)

@@ -12,7 +12,7 @@ from hfg.engine.model.policies import Fifo
 from hfg.engine.model.running_node import ENDED, RunningNode
 from hfg.ports.edges import SyncEdge
 
-__all__ = ["is_plain_and_fed", "lives_by_its_slots", "may_be_called", "may_be_inside"]
+__all__ = ["is_alive", "is_plain_and_fed", "lives_by_its_slots", "may_be_called", "may_be_inside"]
 
 
 def _is_plain(worker: RunningNode) -> bool:
@@ -24,8 +24,10 @@ def _is_plain(worker: RunningNode) -> bool:
         and _nobody_looks(worker)
         and isinstance(worker.group.policy, Fifo)
         and not worker.group.several  # of which one wave would keep the other threads waiting
-        and not (worker.group.threaded and (worker.is_async or worker.listeners))  # which is for the loop to look at
-        and not (worker.options.max_duration_s or worker.gates_over or worker.ready_hook is not None)
+        and not (worker.group.threaded and (worker.is_async or worker.listeners or is_alive(worker)))  # for the loop
+        and not (worker.options.max_duration_s and (worker.is_async or worker.group.threaded))  # else it never waits
+        and worker.ready_hook is None
+        and all(gate.idle_rate_hz is None for gate in worker.gates_over)
         and worker.concurrent is None
         and worker.attempts is None
         and worker.iteration is None
@@ -37,8 +39,8 @@ def _values_in_and_out(worker: RunningNode) -> bool:
     """It takes values and gives back values, and that is all that passes its ports."""
     kind = worker.type
     return (
-        not worker.slot_edges
-        and not (worker.shape.announced or worker.shape.remembers)
+        not worker.shape.remembers
+        and not any(edge.source is worker and type(edge) is SyncEdge for edge in worker.slot_edges)
         and len(worker.out_names) == len(kind.outputs)
         and not any(worker.wants_token)
         and all(edge.target_kind == "input" and not edge.ended for edge in worker.in_edges)
@@ -74,6 +76,14 @@ def may_be_inside(worker: RunningNode) -> bool:
         and not worker.paced
         and _is_plain(worker)
     )
+
+
+def is_alive(worker: RunningNode) -> bool:
+    """Whether more than its inputs decides what a firing does, or more than its outputs leaves with it.
+
+    Only a wave on the loop looks at that, and none in which async code gives way to others.
+    """
+    return bool(worker.slot_edges or worker.gates_over or worker.shape.announced)
 
 
 def may_be_called(worker: RunningNode) -> bool:
@@ -114,11 +124,25 @@ def is_plain_and_fed(worker: RunningNode) -> bool:
         return False
     if worker.type is None or worker.process is None or not _is_plain(worker):
         return False
+    if worker.slot_edges and not _waits_after_firing(worker):
+        return False
     if worker.is_source:
         return worker.type.process_kind in ("generator", "function")
     if worker.type.process_kind not in ("function", "async"):
         return False
     return bool(0 < len(worker.live_inputs) == len(worker.in_edges) and _has_all(worker))
+
+
+def _waits_after_firing(worker: RunningNode) -> bool:
+    """Whether its next firing is never enabled before its outputs are processed: calls that come amid it go first.
+
+    Where nothing waits for what it sends, its next firing has its place when this one begins, before those calls (F9).
+    """
+    return any(
+        type(edge) is SyncEdge and edge.target_kind == "input" and not edge.target.blocked & ENDED
+        for edges in worker.out_edges
+        for edge in edges
+    )
 
 
 def _has_all(worker: RunningNode) -> bool:

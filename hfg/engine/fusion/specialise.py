@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hfg.engine.fusion.members import is_plain_and_fed, lives_by_its_slots
+from hfg.base.token import END
+from hfg.engine.fusion.giving_way import AsyncRegion
+from hfg.engine.fusion.members import is_alive, is_plain_and_fed, lives_by_its_slots
 from hfg.engine.fusion.region import Region
 from hfg.engine.fusion.schedule import schedule
 from hfg.engine.fusion.slots import calls_step
@@ -42,7 +44,8 @@ def _step_of(worker: RunningNode) -> Step:
         return calls_step(worker)
     if not is_plain_and_fed(worker):
         return firing.step
-    alone = waiting_step(worker) if worker.is_async and not worker.paced else firing.step
+    waits = worker.is_async and not (worker.paced or is_alive(worker))
+    alone = waiting_step(worker) if waits else firing.step
     return alone if worker.unfit else _until_warm(worker, alone)
 
 
@@ -57,7 +60,7 @@ def _until_warm(worker: RunningNode, alone: Step) -> Step:
         left -= 1
         if (
             left < 0
-            and not worker.special
+            and not _has_ended(worker)
             and core.started
             and not core.over
             and not core.paused
@@ -67,7 +70,8 @@ def _until_warm(worker: RunningNode, alone: Step) -> Step:
             if found is None or (threaded and len(found.order) == 1):  # in a thread that is one job a wave as it is
                 worker.use_step(alone)
             else:
-                worker.use_step((ThreadRegion if threaded else Region)(found, specialise).step)
+                kind = ThreadRegion if threaded else AsyncRegion if any(one.is_async for one in found.order) else Region
+                worker.use_step(kind(found, specialise).step)
             worker.step(worker)
         else:
             alone(worker)
@@ -78,3 +82,8 @@ def _until_warm(worker: RunningNode, alone: Step) -> Step:
 def _leave_lying(worker: RunningNode) -> None:
     """A graph output: its token lies there until somebody reads it (P10)."""
     worker.dequeued()
+
+
+def _has_ended(worker: RunningNode) -> bool:
+    """Whether its next firing is its last, for which no region needs to be made."""
+    return worker.special and any(token.value is END for edge in worker.live_inputs for token in edge.contents()[:1])

@@ -22,9 +22,10 @@ from typing import Any, NamedTuple
 from typing_extensions import override
 
 from hfg.base.token import NO_MESSAGE
+from hfg.engine.fusion.binding import Fusible, Wave, bind
 from hfg.engine.fusion.region import Region
 from hfg.engine.fusion.schedule import Schedule
-from hfg.engine.fusion.writing import Fusible, Wave, Writer, write_wave
+from hfg.engine.fusion.writing import Writer
 from hfg.engine.model.core import Flags
 from hfg.engine.model.running_node import RunningNode
 from hfg.engine.rules import firing
@@ -109,7 +110,7 @@ class ThreadRegion(Region):
         if self._thread is None:
             self.flags = Flags()
             self._thread = _InThread(self)
-        return write_wave(self, _ThreadWriter(self, measured), to=self._thread)
+        return bind(self, _ThreadWriter(self, measured), to=self._thread)
 
     # --- a wave -----------------------------------------------------------------------------------------------------
 
@@ -134,6 +135,7 @@ class ThreadRegion(Region):
             head.rate.start(self.core.now(), head.options.max_rate_hz)
         self._wave = (self._measured if self._measuring else None) or self._plain
         self.flags.clear()
+        self.called_off = False
         self.running = True
         self.core.code.execute_wave(self._seeing, self._wave.step, (head, stamp, *arguments), self._back)
 
@@ -185,9 +187,9 @@ class ThreadRegion(Region):
         if isinstance(outcome, _Left):
             self._exit(outcome)
         else:
-            self._over(outcome)
+            self._waves_are_over(outcome)
 
-    def _rest(self) -> None:
+    def _rest(self) -> bool:
         """Nobody's code is under way any more; all but the head may be had."""
         for worker in self.order[1:]:
             worker.rest()
@@ -201,8 +203,9 @@ class ThreadRegion(Region):
                 self.silent[number] += thread.silent[number]
                 self.spread[number] += thread.spread[number]
                 thread.silent[number] = thread.spread[number] = 0
+        return False
 
-    def _over(self, done: int) -> None:
+    def _waves_are_over(self, done: int) -> None:
         head = self.head
         self.running = False
         self.waves += done
@@ -323,13 +326,17 @@ class _ThreadWriter(Writer):
         if self.is_source:
             if self.loops:
                 self.say("stamp = monotonic() + epoch")
-            self._call(0, "next(generator)" if self.is_generator else "f0()")
+            self._call(0, "next(generator)" if self.is_generator else "f0()", within=False)
         else:
-            self._call(0, f"f0({', '.join(f'a{at}' for at in range(len(self.head.unset)))})")
+            self._call(0, f"f0({', '.join(f'a{at}' for at in range(len(self.head.unset)))})", within=False)
 
     @override
     def _announce(self, k: int) -> None:
         pass  # all members say so from the beginning of the wave on
+
+    @override
+    def _finish(self, k: int) -> None:
+        pass  # and until its end
 
     @override
     def _spread_out(self, k: int) -> None:
@@ -344,7 +351,7 @@ class _ThreadWriter(Writer):
             say(f"v{k}_{output} = values[{output}]")
 
     @override
-    def _put(self, k: int) -> None:
+    def _put(self, k: int, *, silent: bool = False) -> None:
         values = [f"v{k}_{output}" for _, output, to in self.outs[k] if to is None]
         if values:
             sends = "sends" if k < len(self.order) - 1 else "sends_last"

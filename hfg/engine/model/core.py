@@ -90,6 +90,9 @@ class FusedRegion(Protocol[NodeT]):
     def disturb(self, worker: NodeT) -> None:
         """A member does not rest any more: the interpreted way goes on from here."""
 
+    def activity_changed(self, worker: NodeT) -> None:
+        """A member is active now, or no longer."""
+
     def is_sending(self, worker: NodeT) -> bool:
         """A member's code sends by itself: whether a fused call of it is under way."""
 

@@ -189,6 +189,11 @@ class RunningNode(NodeState["RunningNode"]):
         self.push_next(self)
         self.core.ran_next += 1
 
+    def enqueue_in_front(self) -> None:
+        """It stands in the run queue already, as far as others see it: so it does, in front."""
+        self.push_next(self)
+        self.core.ran_next += 1
+
     def run_next(self) -> None:
         """Go next when the current sending is over; after an earlier call if it is queued for one (F9).
 
@@ -295,11 +300,11 @@ class RunningNode(NodeState["RunningNode"]):
     # --- activity (A3, A5, A9) ----------------------------------------------------------------------------------------
 
     def become(self, active: bool) -> None:
-        """A(v) := active. Its region checks whether activity would move now."""
+        """A(v) := active. Its region may have to check whether activity would move now."""
         self.active = active
         self.show_activity()
         if self.region is not None:
-            self.region.disturb(self)
+            self.region.activity_changed(self)
 
     # --- its end, and starting over (F4, F10, F12, X1) ----------------------------------------------------------------
 

@@ -35,7 +35,9 @@ __all__ = [
     "finish_firing",
     "fire",
     "merge",
+    "newest_stamp",
     "note_start",
+    "receive_modifiers",
     "step",
     "take",
     "values_of",
@@ -108,7 +110,7 @@ def fire(worker: RunningNode, *, ends: bool = False) -> None:
     edges = worker.live_inputs
     tokens = [take(edge) for edge in edges]
     now = core.now()
-    worker.took(shape.sequential, now if worker.is_source else _newest_stamp(tokens, now))
+    worker.took(shape.sequential, now if worker.is_source else newest_stamp(tokens, now))
     if core.sharing is not None:
         sharing.taken(worker, edges, tokens)
         if core.over:
@@ -123,7 +125,7 @@ def fire(worker: RunningNode, *, ends: bool = False) -> None:
     if worker.concurrent is None:
         _note(worker, kind)
     if modifiers:
-        _receive(worker, modifiers)
+        receive_modifiers(worker, modifiers)
     refused = _set_parameters(worker, edges, tokens)
     if worker.concurrent is not None:
         core.rules.begin_concurrent(worker, kind, edges, tokens, refused)
@@ -184,7 +186,7 @@ def _fire_plainly(worker: RunningNode) -> None:
         _place_next(worker)
     for token in tokens:
         if token.activity:
-            _receive(worker, [one.activity for one in tokens if one.activity])
+            receive_modifiers(worker, [one.activity for one in tokens if one.activity])
             break
     if shape.direct:
         worker.core.code.execute(worker, worker.process, [token.value for token in tokens], when_done(worker))  # type: ignore[arg-type]
@@ -200,7 +202,7 @@ def _free_places(worker: RunningNode, edges: Sequence[Any]) -> None:
             rewire(worker)
 
 
-def _receive(worker: RunningNode, modifiers: Sequence[int]) -> None:
+def receive_modifiers(worker: RunningNode, modifiers: Sequence[int]) -> None:
     """A6: what a firing has taken acts, and by that on the subgraphs around."""
     if worker.scopes:
         touch(worker.core, worker.scopes)
@@ -227,7 +229,7 @@ def take(edge: AnyEdge) -> Token[Any]:
     return token
 
 
-def _newest_stamp(tokens: Sequence[Token[Any]], now: float) -> float:
+def newest_stamp(tokens: Sequence[Token[Any]], now: float) -> float:
     """T5: the newest stamp of the values it took, else of all it took."""
     values = [token.stamp for token in tokens if type(token.value) is not Marker]
     return max(values or [token.stamp for token in tokens], default=now)

@@ -30,6 +30,7 @@ from hfg.ports.edges import ACTIVITY, AnyEdge, BufferEdge, EventEdge, Lying, Syn
 from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenProcessed, TokenSent
 
 __all__ = [
+    "activity_left",
     "announce",
     "bring_activity",
     "deferring_events",
@@ -41,6 +42,7 @@ __all__ = [
     "put_value",
     "send_automatic",
     "send_end",
+    "sent",
     "trigger",
     "trigger_from_task",
     "unwrapped",
@@ -74,7 +76,7 @@ def put_outputs(worker: RunningNode, written: Written) -> None:
     since = len(core.next_in_wave)
     _put_outputs(worker, written)
     queue_next_in_wave(core, since)
-    _sent(core)
+    sent(core)
 
 
 def put_value(worker: RunningNode, value: object) -> None:
@@ -96,7 +98,7 @@ def put_value(worker: RunningNode, value: object) -> None:
     if len(core.next_in_wave) > since:
         queue_next_in_wave(core, since)
     if core.returned or core.drained or core.dirty_scopes:
-        _sent(core)
+        sent(core)
 
 
 def put_arrived(worker: RunningNode, value: object, modifier: int, stamp: float) -> None:
@@ -113,7 +115,7 @@ def put_arrived(worker: RunningNode, value: object, modifier: int, stamp: float)
     if len(core.next_in_wave) > since:
         queue_next_in_wave(core, since)
     if core.returned or core.drained or core.dirty_scopes:
-        _sent(core)
+        sent(core)
 
 
 def _put_outputs(worker: RunningNode, written: Written) -> None:
@@ -124,7 +126,7 @@ def _put_outputs(worker: RunningNode, written: Written) -> None:
     if worker.outputs.missing and (worker.fireable or worker.blocked & RATE):
         worker.drop_firing()
     if carried:
-        _activity_left(worker)
+        activity_left(worker)
 
 
 def _tokens(worker: RunningNode, written: Written) -> list[tuple[SyncEdge | BufferEdge, Any, int, float]]:
@@ -147,7 +149,7 @@ def _tokens(worker: RunningNode, written: Written) -> list[tuple[SyncEdge | Buff
     return for_slots + for_inputs
 
 
-def _activity_left(worker: RunningNode) -> None:
+def activity_left(worker: RunningNode) -> None:
     """A5: the first sending that carried +1 took the activity.
 
     The right of A3 stays until the firing or call is over.
@@ -231,7 +233,7 @@ def _drain(edge: AnyEdge, lying: Lying) -> None:
             core.drained.append((target, modifier))
 
 
-def _sent(core: Core) -> None:
+def sent(core: Core) -> None:
     """The sending is on its edges: activity that got nowhere goes back, what was drained acts, the rest follows."""
     if core.returned:
         returned, core.returned = core.returned, []
@@ -277,7 +279,7 @@ def send_end(worker: RunningNode) -> None:
         _put_outputs(worker, [end] * len(worker.out_edges))
         queue_next_in_wave(core, since)
         worker.leave()  # no firing or call goes on that could use it: the next slot call must not (A3)
-        _sent(core)
+        sent(core)
         if core.trace_changes is not None:
             core.trace_changes(NodeEnded(core.now(), worker.path))
         deferred = worker.ending.take_deferred()
@@ -317,8 +319,8 @@ def trigger(
         else:
             _append(edge, value, modifier, stamp)
     if carried:
-        _activity_left(worker)
-    _sent(core)
+        activity_left(worker)
+    sent(core)
     if not core.pumping:
         core.runtime.kick()
     if core.to_notify:
@@ -391,7 +393,7 @@ def _into_operators(edge: EventEdge, token: Token[Any]) -> None:
 def enqueue(edge: EventEdge, value: object, modifier: int, stamp: float) -> None:
     """One token on one event edge, a sending of its own."""
     _append(edge, value, modifier, stamp)
-    _sent(edge.target.core)
+    sent(edge.target.core)
 
 
 def _append(edge: EventEdge, value: object, modifier: int, stamp: float) -> None:

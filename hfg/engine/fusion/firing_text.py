@@ -1,0 +1,486 @@
+"""The text of one firing in a wave: is it silent, what does it run, and what leaves with it. Stands on `binding`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hfg.engine.fusion.binding import Fusible
+from hfg.engine.fusion.schedule import asks_who_hears
+from hfg.engine.fusion.tap_writing import TapWriter
+from hfg.engine.model import RunningNode
+from hfg.ports.edges import EventEdge, SyncEdge
+
+__all__ = ["FiringText"]
+
+
+class FiringText:
+    """Writes the lines of members; `calls` says which line calls which."""
+
+    def __init__(self, region: Fusible, measured: bool) -> None:
+        self.order = region.order
+        self.schedule = region.schedule
+        self.outs = region.schedule.outs
+        self.position = region.schedule.position
+        self.fires_with_slots = region.schedule.fires_with_slots
+        self.entries = region.entries
+        self.measured = measured
+        self.head = self.order[0]
+        self.is_source = self.head.is_source
+        self.is_generator = self.is_source and self.head.type.process_kind == "generator"
+        self.has_border = bool(region.border)
+        self.turns = region.takes_turns
+        self.is_async = any(worker.is_async for worker in self.order)
+        host: Any = region.core.runtime
+        self.real = host.epoch is not None  # time goes on while code runs
+        self.loops = self.real and not self.head.paced and (self.is_source or self._one_queue())
+        self.called = region.schedule.called
+        self.senders = region.activity_senders
+        self.single = [self._is_single(worker) for worker in self.order]
+        self.over_if_silent: set[int] = set()  # behind whose silence no code of the wave runs
+        self.taps = TapWriter(self.outs, self.say, real=self.real)
+        self.forgets = bool(self._kinds()) and not self.is_async  # who gives way is not the one that was entered last
+        self.pending = {j for k in range(len(self.order)) for j in self.schedule.enables[k] if self._is_pending(k, j)}
+        self.lines: list[str] = []
+        self.calls: dict[int, int] = {}
+        self.indent = 0
+
+    def say(self, text: str, call: int | None = None) -> None:
+        """Write a line; `call`: the member whose code it calls."""
+        self.lines.append("    " * self.indent + text)
+        if call is not None:
+            self.calls[len(self.lines)] = call
+
+    # --- what is known of a member ----------------------------------------------------------------------------------
+
+    def _one_queue(self) -> bool:
+        return len(self.entries) == 1 and type(self.entries[0]) is EventEdge
+
+    def _is_single(self, worker: RunningNode) -> bool:
+        """What it gives back is the value of its one output, or nothing."""
+        plain = self.turns or not self._sends_itself(worker)
+        return plain and self.position[worker] not in self.called and worker.type.result in ("none", "single")
+
+    def _sends_itself(self, worker: RunningNode) -> bool:
+        """Whether its code triggers or sends by itself, so that the worker has to say that it runs."""
+        kind = worker.type
+        return worker.sends_itself or (not worker.silent_code and (bool(kind.events) or kind.result == "fields"))
+
+    def _kinds(self) -> list[str]:
+        return [f"t{k}" for k in range(len(self.order)) if self.single[k] and self.order[k].out_names]
+
+    def _is_pipelined(self, edge: Any) -> bool:
+        return type(edge) is SyncEdge and not edge.sequential
+
+    def _heard_outputs(self, k: int) -> list[int]:
+        """Outputs of which each sending is another: who hears it now (T4)."""
+        worker = self.order[k]
+        return [output for output in range(len(worker.out_edges)) if asks_who_hears(worker, output)]
+
+    def carries(self, k: int) -> bool:
+        """Whether member k could give its activity away over one of its edges."""
+        return self.order[k] in self.senders
+
+    def _gives(self, k: int) -> list[str]:
+        """The values by which activity may leave member k."""
+        return list(dict.fromkeys(f"v{k}_{output}" for edge, output, _ in self.outs[k] if edge.active))
+
+    def _gives_inside(self, k: int) -> bool:
+        """Whether it may leave to another member: then the local `m` says whether it has."""
+        return self.turns and any(edge.active and to is not None for edge, _, to in self.outs[k])
+
+    def _givers(self, k: int) -> list[int]:
+        """The members whose activity may come to member k."""
+        if not self.turns:
+            return []
+        edges = self.order[k].slot_edges if k in self.called else self.order[k].live_inputs
+        return sorted({self.position[edge.source] for edge in edges if edge.active and k})
+
+    def _may_take(self, k: int) -> bool:
+        """Whether what member k takes may carry activity, so that it is amid its firing from then on."""
+        return bool(self._givers(k)) or (self.turns and not k and bool(self.entries))
+
+    def _is_pending(self, k: int, j: int) -> bool:
+        """Whether others may run between the sending of member k that enables member j, which has slots, and that."""
+        between = j != k + 1 or j in self.schedule.between or self.fires_with_slots(k)
+        return between and self.turns and self.fires_with_slots(j)
+
+    # --- a member ---------------------------------------------------------------------------------------------------
+
+    def _member(self, k: int) -> None:
+        """One member: outsiders before it, then its firing or call."""
+        if k in self.called or self.order[k].is_async or self._sends_itself(self.order[k]):
+            self.taps.emit()  # its code may send something itself, or others may have a turn
+        if k in self.schedule.between:
+            self.taps.emit()
+            self._stops_if("waiting", f"region.turns({k})", k)
+        if k in self.called:
+            self._slot_call(k)
+            return
+        if self.fires_with_slots(k) and not self.schedule.behind[k]:
+            self.taps.emit()
+            self._stops_if(f"w{k}.fireable" if k in self.pending else f"c{k}", f"region.calls_first({k})", k)
+        if k in self.pending:
+            self.say(f"w{k}.queued = False")
+        worker = self.order[k]
+        edges = {edge.position: edge for edge in worker.live_inputs}
+        arguments = [self._argument(k, at, edges.get(at)) for at in range(len(worker.unset))]
+        needed = [self.schedule.local(edge) for edge in worker.live_inputs if edge.mandatory]
+        if needed:
+            silences = [f"{value} is None" for value in dict.fromkeys(needed) if self._may_be_silent(value)]
+        else:
+            silences = [" and ".join(f"{self.schedule.local(edge)} is None" for edge in worker.live_inputs)]
+        self._firing(k, f"f{k}({', '.join(arguments)})", silences)
+
+    def _stops_if(self, asked: str, call: str, p: int) -> None:
+        """Others move before member p; they may raise a flag, or run a wave of their own, which flags mean then."""
+        self.say(f"if {asked}:")
+        self.say(f"    if {call}: return region.stop({p}, locals())")
+        if self.forgets:
+            self.say("    flags.forget = forget; forget()")
+
+    def _slot_call(self, k: int) -> None:
+        """A slot that an output feeds: a marker is processed at once, the handler is not called (T4, F6)."""
+        say, value = self.say, self.schedule.local(self.order[k].slot_edges[0])
+        say(f"if {value} is not None:")
+        self.indent += 1
+        say(f"core.running_node = w{k}; w{k}.busy = 'call'; w{k}.stamp = stamp")
+        for giver in self._givers(k):
+            say(f"if m{giver}: region.receive({k}, stamp, 'call')")
+        self.taps.before_call(k)
+        say(f"r{k} = f{k}({value})", k)
+        say(f"w{k}.busy = {self._amid()}; w{k}.stamp = None")
+        told = f"w{k}.may_carry or w{k}.events_due"
+        unusual = f"flags{self._unusual()} or type(r{k}) in EXCEPTIONAL"
+        say(f"if {unusual if self.turns else f'{unusual} or {told}'}: return region.leave({k}, locals())")
+        if self.turns:
+            say(f"if {told}: region.finish({k})")
+        self.indent -= 1
+        say(f"else: silent[{k}] += 1")
+
+    def _argument(self, k: int, at: int, edge: Any) -> str:
+        """P6: an absent optional input takes its default."""
+        if edge is None:
+            return f"d{k}_{at}"
+        value = self.schedule.local(edge)
+        return value if edge.mandatory else f"(d{k}_{at} if {value} is None else {value})"
+
+    def _may_be_silent(self, value: str) -> bool:
+        """Whether the wave can go on with this value missing; else it has ended for all behind it."""
+        return int(value[1:].partition("_")[0]) not in self.over_if_silent
+
+    # --- a firing ---------------------------------------------------------------------------------------------------
+
+    def _firing(self, k: int, call: str, silences: Sequence[str]) -> None:
+        """A firing is silent (F4, A11) or a call; what it takes acts in both (A6), after the gate was looked at."""
+        say, worker = self.say, self.order[k]
+        gates = [] if worker.is_source else [f"not g{k}_{number}.active" for number in range(len(worker.gates_over))]
+        silence = " or ".join([*silences, *gates])
+        if self._may_take(k) and gates:
+            say(f"quiet = {silence}")
+            silence = "quiet"
+        self._receive(k)
+        if not silence:
+            self._call(k, call, within=False)
+            self._fired(k)
+            return
+        told = self.taps.branch()
+        say(f"if {silence}:")
+        self.indent += 1
+        ends = self._be_silent(k)
+        self.indent -= 1
+        self.taps.other_branch(told)
+        if ends:
+            self._call(k, call, within=False)
+        else:
+            say("else:")
+            self.indent += 1
+            self._call(k, call, within=True)
+            self.indent -= 1
+        self._fired(k)
+
+    def _receive(self, k: int) -> None:
+        """A6: what carries activity acts when it is taken."""
+        if not self._may_take(k):
+            return
+        if k:
+            asked = " or ".join(f"m{giver}" for giver in self._givers(k))
+            self.say(f"if {asked}: region.receive({k}, stamp)")
+        else:
+            tokens = [f"token{number}" for number in range(len(self.entries))]
+            asked = " or ".join(f"{token}.activity" for token in tokens)
+            self.say(f"if {asked}: region.receive_at(0, ({', '.join(tokens)},), stamp)")
+
+    def _be_silent(self, k: int) -> bool:
+        """A silent firing; whether the wave is over by it, for all behind are silent as well."""
+        say, worker = self.say, self.order[k]
+        say(" = ".join([*(f"v{k}_{output}" for output in range(max(1, len(worker.out_names)))), "None"]))
+        say(f"silent[{k}] += 1")
+        self._meet(k, "mute")
+        if self._may_take(k):
+            say(f"if w{k}.busy: region.finish({k})")
+        if self._silences_all_behind(k) and not self.fires_with_slots(k) and self._over_by_silence(k, surely=True):
+            return True
+        if self._gives_inside(k):
+            say(f"m{k} = False")
+        self._put(k, silent=True)
+        return False
+
+    def _over_by_silence(self, k: int, *, surely: bool) -> bool:
+        """All behind member k are silent, so the wave is over; not while calls wait there, for those have places.
+
+        Args:
+          k: the member.
+          surely: no silence of it goes another way.
+        """
+        say = self.say
+        called = [f"c{j}" for j in range(k + 1, len(self.order)) if self.fires_with_slots(j)]
+        if called:
+            say(f"if not ({' or '.join(called)}):")
+            self.indent += 1
+        elif surely:
+            self.over_if_silent.add(k)
+        say(f"spread[{k}] += 1")
+        told = self.taps.branch()
+        if self.loops:
+            self._end_of_wave()
+            say("continue")
+        else:
+            self.taps.emit()
+            say("return region.over(done + 1)")
+        self.taps.other_branch(told)
+        if called:
+            self.indent -= 1
+        return not called
+
+    def _silences_all_behind(self, k: int) -> bool:
+        """If it is silent, so is everybody behind it, and nothing of theirs or its own leaves the region or is seen.
+
+        Silence into a slot outside leaves nothing but a number (T4).
+        """
+        if len(self.order) == k + 1 or (not self.turns and not self.single[k]):
+            return False
+        silent = {k}
+        for t in range(k + 1, len(self.order)):
+            called = t in self.called
+            fed = self.order[t].slot_edges if called else [one for one in self.order[t].live_inputs if one.mandatory]
+            if any(self.position[edge.source] in silent for edge in fed):
+                silent.add(t)
+        seen = self.taps.anybody_behind(k) or any(self._heard_outputs(j) for j in range(k, len(self.order)))
+        leaves = any(
+            to is None and not (self.turns and edge.target_kind == "slot" and edge.tap is None)
+            for out in self.outs[k:]
+            for edge, _, to in out
+        )
+        return len(silent) == len(self.order) - k and not seen and not leaves
+
+    def _call(self, k: int, call: str, *, within: bool) -> None:
+        """Call a member, look at what it gives back, and let that leave."""
+        worker = self.order[k]
+        if not k and self.head.options.max_rate_hz and not self.head.group.threaded:  # silent ones do not count (F11)
+            self.say("worker.rate.start(now(), worker.options.max_rate_hz)")
+        self.taps.before_call(k)
+        if self._sends_itself(worker):
+            self._announce(k)
+        if self.measured:
+            self.say("began = monotonic()")
+        if worker.is_async:
+            call = f"await {call}"
+        self.say(f"{'v' if self.single[k] else 'r'}{k}{'_0' if self.single[k] else ''} = {call}", k)
+        if self.measured:
+            self._measure(k)
+        if not self.single[k]:
+            self._spread_out(k)
+        elif worker.out_names:
+            self._guard(k, within=within)
+        else:
+            self.say(f"if v{k}_0 is not None or flags{self._unusual()}: return region.leave({k}, locals())")
+        self._meet(k, "leave")
+        self._send(k)
+
+    def _measure(self, k: int) -> None:
+        self.say("ended = monotonic()")
+        delay = "" if self.is_source and not k else ", ended + epoch - stamp" if self.real else ", now() - stamp"
+        if self.order[k].is_async:  # while it waited others ran: that kept nobody busy
+            delay = f"{delay or ', None'}, 0.0 if region.detached or region.amid else None"
+        self.say(f"took{k}(ended - began{delay})")
+
+    def _announce(self, k: int) -> None:
+        """What the member's code sends by itself is to find that the worker runs."""
+        self.say(f"core.running_node = w{k}; w{k}.busy = 'firing'; w{k}.stamp = stamp")
+
+    def _unusual(self) -> str:
+        return " or region.detached or region.called_off" if self.is_async else ""
+
+    def _amid(self) -> str:
+        """What a member is when its call is over: busy with all others, if the wave gives way."""
+        return "region.amid" if self.is_async else "''"
+
+    def _guard(self, k: int, *, within: bool) -> None:
+        """One value or none; code that sends by itself may have written it instead."""
+        say, value = self.say, f"v{k}_0"
+        asked = "" if self.forgets else f" or flags{self._unusual()}"
+        writes = self._sends_itself(self.order[k])
+        say(f"if type({value}) is not t{k}{asked}{f' or w{k}.written is not None' if writes else ''}:")
+        self.indent += 1
+        say(f"if flags or type({value}) in EXCEPTIONAL{self._unusual()}: return region.leave({k}, locals())")
+        if writes:
+            say(f"if w{k}.written is not None:")
+            say(f"    values = values_of(region, {k}, {value})", k)
+            say(f"    if values is None: return region.leave({k}, locals())")
+            say(f"    {value} = values[0]; w{k}.written = None")
+        say(f"if {value} is not None: t{k} = type({value})")
+        if not within:
+            self._end_if_silent(k)
+        self.indent -= 1
+
+    def _end_if_silent(self, k: int) -> None:
+        """The member has nothing to say, and all behind are silent by that."""
+        worker = self.order[k]
+        if worker.shape.announced or self.fires_with_slots(k) or not self._silences_all_behind(k):
+            return
+        odd = [f"w{k}.may_carry", f"w{k}.events_due"] if self._sends_itself(worker) else []
+        odd += [f"w{k}.busy"] if self._may_take(k) and not odd else []
+        asked = f"if not ({' or '.join(odd)})" if odd else ""
+        self.say(f"{'el' if asked else 'else'}{asked}:")
+        self.indent += 1
+        if self._sends_itself(worker):
+            self._finish(k)
+        self._over_by_silence(k, surely=not odd)
+        self.indent -= 1
+
+    def _spread_out(self, k: int) -> None:
+        """Several outputs, or sent by the code itself."""
+        say, worker = self.say, self.order[k]
+        told = f" or w{k}.may_carry" if self._sends_itself(worker) and not self.turns else ""
+        say(f"if flags{told}{self._unusual()}: return region.leave({k}, locals())")
+        if worker.out_names:
+            say(f"values = values_of(region, {k}, r{k})", k)
+            say(f"if values is None: return region.leave({k}, locals())")
+        else:
+            say(f"if r{k} is not None: return region.leave({k}, locals())")
+        for output in range(len(worker.out_names)):
+            say(f"v{k}_{output} = values[{output}]")
+
+    # --- what leaves ------------------------------------------------------------------------------------------------
+
+    def _meet(self, k: int, how: str) -> None:
+        """F9: calls that wait where member k enables a firing come first; while others have turns before, by rules."""
+        met = [f"c{j}" for j in self.schedule.enables[k] if self.fires_with_slots(j) and self.schedule.behind[j]]
+        if how == "leave":
+            outputs = [
+                output for number, (_, output, _) in enumerate(self.outs[k]) if (k, number) in self.schedule.calls
+            ]
+            met += [f"v{k}_{output} is not None" for output in dict.fromkeys(outputs)]
+        if met:
+            self.say(f"if {' or '.join(met)}: return region.{how}({k}, locals())")
+
+    def _end_of_wave(self) -> None:
+        """Is there another wave at once?"""
+        raise NotImplementedError
+
+    def _send(self, k: int) -> None:
+        """What a firing has given leaves; where activity goes along, or something is told, the region sees to it."""
+        say, worker = self.say, self.order[k]
+        writes = self._sends_itself(worker)
+        if writes and worker.out_names and not self.single[k]:
+            say(f"w{k}.written = None")  # behind the last guard: a side exit would not find it
+        odd = self._odd_sending(k)
+        if not odd:
+            self._put(k)
+        else:
+            self.taps.emit()
+            values = ", ".join(f"v{k}_{output}" for output in range(len(worker.out_names)))
+            gives_inside = self._gives_inside(k)
+            say(f"if {odd}:")
+            self.indent += 1
+            told = self.taps.branch()
+            say(f"{f'm{k} = ' if gives_inside else ''}region.send({k}, ({values}{',' if values else ''}), stamp, done)")
+            self.indent -= 1
+            self.taps.other_branch(told)
+            say("else:")
+            self.indent += 1
+            self._put(k)
+            self.taps.emit()
+            say(f"m{k} = False" if gives_inside else "pass")
+            self.indent -= 1
+        if writes:
+            self._finish(k)
+
+    def _finish(self, k: int) -> None:
+        self.say(f"w{k}.busy = {self._amid()}; w{k}.stamp = None")
+
+    def _odd_sending(self, k: int) -> str:
+        """Whether more than values leaves with the firing."""
+        worker = self.order[k]
+        if not self.turns:
+            return ""
+        if worker.shape.announced:
+            return "True"
+        odd = []
+        if self._sends_itself(worker):
+            odd += [f"w{k}.may_carry", f"w{k}.events_due"]
+        elif self._may_take(k):
+            odd.append(f"w{k}.busy")
+        gives = " or ".join(f"{value} is not None" for value in self._gives(k))
+        return " or ".join([*odd, f"w{k}.active and ({gives})"] if gives else odd)
+
+    def _put(self, k: int, *, silent: bool = False) -> None:
+        """Over the border of the region; who looks at an edge inside sees a token, which nobody else needs."""
+        heard: set[int] = set()
+        for number, (_, output, to) in enumerate(self.outs[k]):
+            value = "NO_MESSAGE" if silent else f"NO_MESSAGE if v{k}_{output} is None else v{k}_{output}"
+            if output in self._heard_outputs(k):
+                if output not in heard:
+                    heard.add(output)
+                    self.taps.emit()
+                    how = f"region.put_heard({k}, {output}, " if self.turns else f"put_heard(heard{k}_{output}, "
+                    self.say(f"{how}{value}, stamp)")
+            elif to is None:
+                self._put_out(k, number, value)
+            else:
+                self.taps.passed(k, number, output)
+        if self.is_async and (heard or any(to is None for _, _, to in self.outs[k])):
+            self.say("if region.amid: region.sent_on()")
+
+    def _put_out(self, k: int, number: int, value: str) -> None:
+        """Over one edge; silence into a slot leaves no more than a number (T4)."""
+        say = self.say
+        edge, output, _ = self.outs[k][number]
+        if edge.tap is not None:
+            self.taps.emit()
+        elif self.turns and edge.target_kind == "slot":
+            if value == "NO_MESSAGE":
+                say(f"e{k}_{number}.sent += 1")
+                return
+            say(f"if v{k}_{output} is None: e{k}_{number}.sent += 1")
+            say("else:")
+            self.indent += 1
+            self._put_token(k, number, f"v{k}_{output}")
+            self.indent -= 1
+            return
+        self._put_token(k, number, value)
+
+    def _put_token(self, k: int, number: int, value: str) -> None:
+        self.say(f"put(e{k}_{number}, {value}, 0, stamp)")
+        if self.turns and self.outs[k][number][0].depth_first:
+            self.say(f"if next_in_wave: region.note({k}, {number})")
+
+    def _fired(self, k: int) -> None:
+        """The firing is over: those that it has enabled have their places, and so have calls that came meanwhile."""
+        say = self.say
+        for j in self.schedule.enables[k]:
+            if j not in self.pending:
+                continue
+            if not self.schedule.behind[j]:  # else that was a side exit
+                say(f"if c{j}: region.expect({j})")
+                say(f"else: w{j}.queued = True")
+            else:
+                say(f"w{j}.queued = True")  # what calls it now has its place behind its firing (F9)
+        if not self.fires_with_slots(k):
+            return
+        self.taps.emit()
+        if k + 1 < len(self.order):
+            self._stops_if(f"c{k}", f"region.call_again({k})", k + 1)
+        else:
+            say(f"if c{k}: region.call_again({k})")

@@ -1,0 +1,187 @@
+"""What may come amid a wave without ending it: turns of outsiders, calls of members, activity that moves.
+
+The text of a wave is straight-line code for what happens in each wave. What happens seldom is a call of one of these
+methods, which do what the rules say about it and give back whether the wave goes on. Three things make that possible:
+
+- **turns**: an outsider that a member enables stands in front of the run queue by R2, before the members that follow.
+  So the wave puts a *turnstile* into the queue, the outsider before it, and works the queue off up to that. That is R2
+  by the letter, and one odd node does not break a wave of sixty.
+- **calls**: a member with slots takes part in the run queue like any node. The wave sets its `queued` while its firing
+  is enabled and others have turns, so that calls which come then find their place behind it; and it looks whether calls
+  wait when it enables the firing, for those come first (F9).
+- **activity**: what carries +1 lies on its edge as a token, where subgraphs and A14 look for it; the local of the wave
+  holds the value all the same.
+
+Stands on `wave_state`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hfg.activity.rules import leaving
+from hfg.base.token import NO_MESSAGE, Token
+from hfg.engine.fusion.wave_state import WaveState
+from hfg.engine.model.running_node import NO_CALLS, RunningNode
+from hfg.engine.model.tap import tap_inside
+from hfg.engine.rules.firing import receive_modifiers
+from hfg.engine.rules.sending import activity_left, announce, bring_activity, put, send_automatic, sent
+
+__all__ = ["Turns"]
+
+
+class _Turnstile:
+    """Stands in the run queue behind those that have their turns amid a wave; nobody gets past it."""
+
+    calls = ()
+
+
+class Turns(WaveState):
+    """The parts of a wave that are not in its text."""
+
+    # --- outsiders --------------------------------------------------------------------------------------------------
+
+    def note(self, k: int, number: int) -> None:
+        """What member k has sent over this edge has enabled an outsider: its turn comes where R2 has it."""
+        next_in_wave = self.core.next_in_wave
+        self.waiting[k, number] = next_in_wave.pop()
+        assert not next_in_wave, "one token enables one node"
+
+    def turns(self, p: int) -> bool:
+        """Outsiders whose turns come right before member p have them; whether the wave is to stop there."""
+        keys = [key for _, key in self.schedule.between[p]]
+        return any(key in self.waiting and not self._turn(self.waiting.pop(key)) for key in keys)
+
+    def _turn(self, worker: RunningNode) -> bool:
+        """It moves now, and all that follows from that over sequential edges; whether the wave may go on."""
+        queue: Any = self.head.group.policy
+        turnstile = _Turnstile()
+        queue.appendleft(turnstile)
+        queue.appendleft(worker)
+        if self._work_off(queue, turnstile):
+            return True
+        while (one := queue.popleft()) is not turnstile:  # which come before all that the wave leaves to the queue
+            self._first.append(one)
+        return False
+
+    def _work_off(self, queue: Any, until: Any) -> bool:
+        """Let those move that stand before `until` in the run queue, and take that out; False: something came up."""
+        group, core, flags, outputs = self.head.group, self.core, self.flags, self.head.outputs
+        budget, ran_next = group.budget, core.ran_next
+        group.set_budget(1)  # a row of calls would run past the end
+        outputs.expect()  # the head has fired, and its wave is not over: what has left the region does not free it
+        goes_on = True
+        while goes_on:
+            one = queue.popleft()
+            if one is until and not (one.calls and one.calls_before):
+                break
+            one.step(one)
+            goes_on = not ((flags and core.ends_slice()) or self.called_off)
+        outputs.count(outputs.missing - 1)
+        group.set_budget(budget)
+        core.ran_next = ran_next  # these turns belong to the wave, and the pump has not counted them
+        core.running_node = self.head
+        return goes_on
+
+    # --- calls of members -------------------------------------------------------------------------------------------
+
+    def expect(self, p: int) -> None:
+        """Member p is enabled, and calls wait at it: they come before its firing, where they stand (F9)."""
+        worker = self.order[p]
+        worker.make_fireable()
+        worker.is_next = True
+
+    def calls_first(self, p: int) -> bool:
+        """Calls wait at member p, and nobody of the wave goes before it any more; whether the wave is to stop there.
+
+        All that stands before them in the run queue has its turn as well (R2).
+        """
+        worker = self.order[p]
+        if not worker.fireable:
+            self.expect(p)
+        if not self._work_off(self.head.group.policy, worker):
+            return True
+        worker.queued = worker.fireable = False
+        return False
+
+    def call_again(self, k: int) -> bool:
+        """Member k has fired, and calls wait at it: they have their place now; whether the wave is to stop there."""
+        worker = self.order[k]
+        goes_next, worker.is_next = worker.is_next, False
+        if worker.blocked >= NO_CALLS:
+            return False
+        if not goes_next:
+            worker.enqueue()
+            return False
+        worker.queued = True  # its call was enabled over a sequential edge, and goes before all else (R2)
+        return not self._turn(worker)
+
+    # --- activity, and what a firing sends by itself ----------------------------------------------------------------
+
+    def receive(self, k: int, stamp: float, doing: str = "firing") -> None:
+        """Member k has taken what lay on its active edges (A6)."""
+        edges = self.order[k].slot_edges if k in self.schedule.called else self.order[k].live_inputs
+        tokens = [edge.take() for edge in edges if edge.token is not None]
+        self.receive_at(k, tokens, stamp, doing)
+
+    def receive_at(self, k: int, tokens: Sequence[Token[Any]], stamp: float, doing: str = "firing") -> None:
+        """The same for given tokens; from here on the node is amid its firing or call."""
+        worker = self.order[k]
+        worker.busy, worker.stamp = doing, stamp
+        receive_modifiers(worker, [token.activity for token in tokens if token.activity])
+
+    def send(self, k: int, values: Sequence[Any], stamp: float, done: int) -> bool:
+        """Member k sends, and activity leaves with that, or something is told behind it (A3, A5, A9).
+
+        Args:
+          k: the member.
+          values: what it sends, by output; None is silence.
+          stamp: of the wave.
+          done: waves of this run of the text that are over.
+
+        Returns:
+          Whether a token with activity lies on one of its edges inside the region.
+        """
+        worker, core = self.order[k], self.core
+        worker.busy, worker.stamp = "firing", stamp
+        may_carry, carried, inside = worker.active or worker.may_carry, False, False
+        hearing = [heard and heard.who_hear() for heard in worker.listeners]
+        for number, (edge, output, to) in enumerate(self.schedule.outs[k]):
+            value = NO_MESSAGE if values[output] is None else values[output]
+            modifier = leaving(may_carry, edge.active, None, value is NO_MESSAGE)
+            carried = carried or modifier > 0
+            if to is not None:
+                token = Token(value, modifier, stamp, edge.sent + self.waves + done + 1)
+                look = tap_inside(edge)
+                if look is not None:
+                    look(token)
+                if modifier:
+                    edge.token = token
+                    bring_activity(edge.target)
+                    inside = True
+            elif not (hearing and hearing[output] is not None and edge not in hearing[output]):
+                put(edge, value, modifier, stamp)
+                if core.next_in_wave:
+                    self.note(k, number)
+        if carried:
+            activity_left(worker)
+        sent(core)
+        if worker.shape.announced:
+            announce(worker, [None if value is None else (value, None, None) for value in values])
+        self.finish(k)
+        return inside
+
+    def put_heard(self, k: int, output: int, value: Any, stamp: float) -> None:
+        """Put a token on the edges of an output to those who hear it now (T4)."""
+        for edge in self.order[k].listeners[output].who_hear():
+            put(edge, value, 0, stamp)
+            if self.core.next_in_wave:
+                self.note(k, self._number_of[edge])
+
+    def finish(self, k: int) -> None:
+        """The automatic events of member k follow, then its firing or call is over (A9, A3)."""
+        worker = self.order[k]
+        send_automatic(worker)
+        worker.leave()
+        worker.rest()
