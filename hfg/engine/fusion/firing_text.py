@@ -40,6 +40,7 @@ class FiringText:
         self.over_if_silent: set[int] = set()  # behind whose silence no code of the wave runs
         self.taps = TapWriter(self.outs, self.say, real=self.real)
         self.forgets = bool(self._kinds()) and not self.is_async  # who gives way is not the one that was entered last
+        self.last_calls = [f"c{len(self.order) - 1}"] if self.fires_with_slots(len(self.order) - 1) else []
         self.pending = {j for k in range(len(self.order)) for j in self.schedule.enables[k] if self._is_pending(k, j)}
         self.lines: list[str] = []
         self.calls: dict[int, int] = {}
@@ -102,8 +103,9 @@ class FiringText:
 
     def _is_pending(self, k: int, j: int) -> bool:
         """Whether others may run between the sending of member k that enables member j, which has slots, and that."""
-        between = j != k + 1 or j in self.schedule.between or self.fires_with_slots(k)
-        return between and self.turns and self.fires_with_slots(j)
+        if not (self.turns and self.fires_with_slots(j)):
+            return False
+        return j != k + 1 or j in self.schedule.between or self.fires_with_slots(k) or bool(self._odd_sending(k))
 
     # --- a member ---------------------------------------------------------------------------------------------------
 
@@ -217,29 +219,35 @@ class FiringText:
         say(" = ".join([*(f"v{k}_{output}" for output in range(max(1, len(worker.out_names)))), "None"]))
         say(f"silent[{k}] += 1")
         self._meet(k, "mute")
-        if self._may_take(k):
-            say(f"if w{k}.busy: region.finish({k})")
-        if self._silences_all_behind(k) and not self.fires_with_slots(k) and self._over_by_silence(k, surely=True):
-            return True
+        if self._silences_all_behind(k) and not self.fires_with_slots(k):
+            self._over_by_silence(k, [f"w{k}.busy"] if self._may_take(k) else [])
+            if self._is_over_by_silence(k):
+                return True
         if self._gives_inside(k):
             say(f"m{k} = False")
         self._put(k, silent=True)
+        self._enable(k)
+        if self._may_take(k):
+            say(f"if w{k}.busy: region.finish({k})")
         return False
 
-    def _over_by_silence(self, k: int, *, surely: bool) -> bool:
+    def _is_over_by_silence(self, k: int) -> bool:
+        """Whether the silence of member k ends the wave, whatever else there is: all behind are silent by it."""
+        called = any(self.fires_with_slots(j) for j in range(k, len(self.order)))
+        return not called and not self._may_take(k) and self._silences_all_behind(k)
+
+    def _over_by_silence(self, k: int, odd: list[str]) -> None:
         """All behind member k are silent, so the wave is over; not while calls wait there, for those have places.
 
         Args:
           k: the member.
-          surely: no silence of it goes another way.
+          odd: what else keeps the wave from being over.
         """
         say = self.say
-        called = [f"c{j}" for j in range(k + 1, len(self.order)) if self.fires_with_slots(j)]
-        if called:
-            say(f"if not ({' or '.join(called)}):")
+        odd = [*odd, *(f"c{j}" for j in range(k + 1, len(self.order)) if self.fires_with_slots(j))]
+        if odd:
+            say(f"if not ({' or '.join(odd)}):")
             self.indent += 1
-        elif surely:
-            self.over_if_silent.add(k)
         say(f"spread[{k}] += 1")
         told = self.taps.branch()
         if self.loops:
@@ -249,9 +257,8 @@ class FiringText:
             self.taps.emit()
             say("return region.over(done + 1)")
         self.taps.other_branch(told)
-        if called:
+        if odd:
             self.indent -= 1
-        return not called
 
     def _silences_all_behind(self, k: int) -> bool:
         """If it is silent, so is everybody behind it, and nothing of theirs or its own leaves the region or is seen.
@@ -341,12 +348,14 @@ class FiringText:
             return
         odd = [f"w{k}.may_carry", f"w{k}.events_due"] if self._sends_itself(worker) else []
         odd += [f"w{k}.busy"] if self._may_take(k) and not odd else []
-        asked = f"if not ({' or '.join(odd)})" if odd else ""
-        self.say(f"{'el' if asked else 'else'}{asked}:")
+        self.say("else:")
         self.indent += 1
         if self._sends_itself(worker):
-            self._finish(k)
-        self._over_by_silence(k, surely=not odd)
+            self.say(f"if not ({' or '.join(odd)}):")
+            self.say(f"    w{k}.busy = ''; w{k}.stamp = None")
+        self._over_by_silence(k, odd)
+        if self._is_over_by_silence(k) and not odd:
+            self.over_if_silent.add(k)
         self.indent -= 1
 
     def _spread_out(self, k: int) -> None:
@@ -388,6 +397,7 @@ class FiringText:
         odd = self._odd_sending(k)
         if not odd:
             self._put(k)
+            self._enable(k)
         else:
             self.taps.emit()
             values = ", ".join(f"v{k}_{output}" for output in range(len(worker.out_names)))
@@ -403,6 +413,7 @@ class FiringText:
             self._put(k)
             self.taps.emit()
             say(f"m{k} = False" if gives_inside else "pass")
+            self._enable(k)
             self.indent -= 1
         if writes:
             self._finish(k)
@@ -466,8 +477,8 @@ class FiringText:
         if self.turns and self.outs[k][number][0].depth_first:
             self.say(f"if next_in_wave: region.note({k}, {number})")
 
-    def _fired(self, k: int) -> None:
-        """The firing is over: those that it has enabled have their places, and so have calls that came meanwhile."""
+    def _enable(self, k: int) -> None:
+        """Those that the sending has enabled have their places from now on."""
         say = self.say
         for j in self.schedule.enables[k]:
             if j not in self.pending:
@@ -477,10 +488,11 @@ class FiringText:
                 say(f"else: w{j}.queued = True")
             else:
                 say(f"w{j}.queued = True")  # what calls it now has its place behind its firing (F9)
+
+    def _fired(self, k: int) -> None:
+        """The firing is over: calls that came meanwhile have their places."""
         if not self.fires_with_slots(k):
             return
         self.taps.emit()
-        if k + 1 < len(self.order):
+        if k + 1 < len(self.order):  # behind the last one the head has its place first, which is freed by that (F5)
             self._stops_if(f"c{k}", f"region.call_again({k})", k + 1)
-        else:
-            say(f"if c{k}: region.call_again({k})")

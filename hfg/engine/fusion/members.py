@@ -24,7 +24,8 @@ def _is_plain(worker: RunningNode) -> bool:
         and _nobody_looks(worker)
         and isinstance(worker.group.policy, Fifo)
         and not worker.group.several  # of which one wave would keep the other threads waiting
-        and not (worker.group.threaded and (worker.is_async or worker.listeners or is_alive(worker)))  # for the loop
+        and not (worker.group.threaded and (worker.is_async or worker.listeners))  # which is for the loop to look at
+        and not (is_alive(worker) and (worker.group.threaded or worker.is_async))
         and not (worker.options.max_duration_s and (worker.is_async or worker.group.threaded))  # else it never waits
         and worker.ready_hook is None
         and all(gate.idle_rate_hz is None for gate in worker.gates_over)

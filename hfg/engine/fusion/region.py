@@ -109,6 +109,9 @@ class Region(Exits):
         self.waves += done
         self._over()
         agenda.consider(self.head)
+        last = self.order[-1]
+        if last.calls and self.schedule.fires_with_slots(len(self.order) - 1) and not last.busy:
+            agenda.idle_again(last)
 
     def _over(self) -> None:
         """Those outside whom the wave has enabled go next, and what the head has taken is processed, if it is (F5)."""

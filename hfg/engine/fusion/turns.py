@@ -86,6 +86,13 @@ class Turns(WaveState):
 
     # --- calls of members -------------------------------------------------------------------------------------------
 
+    def _enable(self, p: int) -> None:
+        """Member p is enabled: what calls it from now on has its place behind its firing, what waits before (F9)."""
+        if self.order[p].calls:
+            self.expect(p)
+        else:
+            self.order[p].queued = True
+
     def expect(self, p: int) -> None:
         """Member p is enabled, and calls wait at it: they come before its firing, where they stand (F9)."""
         worker = self.order[p]
@@ -164,6 +171,9 @@ class Turns(WaveState):
                 put(edge, value, modifier, stamp)
                 if core.next_in_wave:
                     self.note(k, number)
+        for j in self.schedule.enables[k]:
+            if self.schedule.fires_with_slots(j):
+                self._enable(j)
         if carried:
             activity_left(worker)
         sent(core)

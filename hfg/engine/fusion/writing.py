@@ -140,8 +140,11 @@ class Writer(FiringText):
                 odd.append(f"entry{number}.{'token.activity' if type(edge) is SyncEdge else f'queue[0][{ACTIVITY}]'}")
         if not self.turns and self.carries(0):
             odd.append("worker.active")
-        odd.append("(worker.special and not region.may_go_on())" if self._may_be_mute() else "worker.special")
+        if not self._may_be_mute():
+            odd.append("worker.special")
         odd.append("not (region.armed or region.arm())")
+        if self._may_be_mute():  # the last of all, for from then on nothing tells that the firing is not ordinary
+            odd.append("(worker.special and not region.may_go_on())")
         return odd
 
     def _may_be_mute(self) -> bool:
@@ -208,7 +211,7 @@ class Writer(FiringText):
         say("done += 1")
         if not self.loops:
             return
-        stop = ["queue", "ready", "flags", "worker.blocked"]
+        stop = ["queue", "ready", "flags", "worker.blocked", *self.last_calls]
         stop += ["region.amid"] if self.is_async else []
         if not self.is_source:
             stop += ["inputs.missing", "worker.special", "now() > core.until"]
@@ -226,7 +229,8 @@ class Writer(FiringText):
     def _go_on_at_once(self) -> None:
         """Where nothing unusual has come the source has its next turn: what `over` would find, without a call."""
         say = self.say
-        say("if not (flags or worker.blocked or worker.fireable or worker.queued or region.doomed or next_in_wave):")
+        odd = ["flags", "worker.blocked", "worker.fireable", "worker.queued", "region.doomed", *self.last_calls]
+        say(f"if not ({' or '.join(odd)} or next_in_wave):")
         self.indent += 1
         say("region.running = False")
         say("region.waves += done")
