@@ -22,8 +22,8 @@
     show        sentences, tracebacks, tables
     encoding    JSON
 
-Exit codes: 0 success; 1 a run or check that failed, also by `abort`, a stall or Ctrl-C; 2 wrong use. A verb reports to
-standard output, everything else goes to standard error. `import hfg` does not import any of this.
+Exit codes: 0 success; 1 a run or check that failed, including by `abort`, a stall or Ctrl-C; 2 wrong use. A verb writes
+its result to standard output and everything else to standard error. `import hfg` does not import any of this.
 """
 
 from hfg.cli.app import main

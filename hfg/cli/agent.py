@@ -1,6 +1,6 @@
 """`hfg agent`: lets this host run parts of graphs, until it is ended.
 
-Stands on `hfg.parts.hosts.agent` and `hosting`.
+Depends on `hfg.parts.hosts.agent` and `hosting`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP"
 
 
 def session_settings(settings: str | None) -> dict[str, Any]:
-    """Give what opens a session in the realm of a file, or in the default one."""
+    """Return the settings of a session in the realm of a settings file, or in the default realm."""
     return {"settings": str(Path(settings).resolve())} if settings else {}
 
 

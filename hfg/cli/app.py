@@ -1,6 +1,6 @@
-"""The command `hfg`: its verbs, and what becomes of an error that a verb does not expect.
+"""The command `hfg`: its verbs, and the handling of errors that a verb does not expect.
 
-Stands on `verbs`. Verbs return their exit code; only `main` knows about the process.
+Depends on `verbs`. Verbs return their exit code; only `main` knows about the process.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def _root(
 
 @contextmanager
 def _streams() -> Iterator[None]:
-    """Somebody may have closed standard output or standard error, before or meanwhile (`hfg nodes | head`)."""
+    """Handle a standard output or standard error that is closed, before or meanwhile (`hfg nodes | head`)."""
     with Path(os.devnull).open("w", encoding="utf-8") as nowhere, ExitStack() as replaced:
         if sys.stdout is None:
             replaced.enter_context(redirect_stdout(nowhere))
@@ -74,10 +74,10 @@ def _streams() -> Iterator[None]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command and give back its exit code.
+    """Run the command. Return its exit code.
 
     Args:
-      arguments: those behind "hfg"; the process's own if not given.
+      arguments: arguments after "hfg"; by default those of the process.
     """
     show.set_arguments(sys.argv[1:] if arguments is None else arguments)
     with Interrupt.installed(), _streams():

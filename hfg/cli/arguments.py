@@ -1,6 +1,6 @@
 """`--arg count=3`: arguments of the function that builds a graph, read by its type hints.
 
-Stands on the types; runs nothing.
+Depends on the types; runs nothing.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def builder_arguments(place: str, builder: Callable[..., Any], given: Sequence[s
       given: "name=value" each.
 
     Raises:
-      TargetError: an argument is none of the function's, is missing, or its value is not of its type.
+      TargetError: the function has no such argument, an argument is missing, or a value is not of its type.
     """
     parameters = inspect.signature(builder).parameters
     name_of = f"{place}: {getattr(builder, '__name__', builder)}()"
@@ -52,7 +52,7 @@ def builder_arguments(place: str, builder: Callable[..., Any], given: Sequence[s
 def _hints(builder: Callable[..., Any]) -> dict[str, Any]:
     try:
         return typing.get_type_hints(builder)
-    except Exception:  # names that exist for type checkers alone: then the defaults tell
+    except Exception:  # names that exist only for type checkers: then the defaults show the types
         return {}
 
 
@@ -77,7 +77,7 @@ def _value(where: str, name: str, text: str, hint: Any) -> Any:
 
 
 def _made(hint: Any, value: Any) -> Any:
-    """What a class makes of a text, as Path does; None if it does not."""
+    """Return what a class such as Path makes of a string; None if it makes nothing."""
     if not isinstance(hint, type) or not isinstance(value, str) or issubclass(hint, bool | int | float):
         return None
     make: Any = hint

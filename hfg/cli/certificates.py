@@ -1,8 +1,8 @@
 """Makes a test authority and certificates signed by it, as PEM files that only their owner may read.
 
-A *test* authority: its key lies beside what it signs, so whoever can read the folder can be anybody. Stands on the
-package cryptography, of the extra zenoh, for the command line of OpenSSL is not everywhere and differs from version to
-version.
+A *test* authority: its key is stored next to the certificates that it signs, so anyone who can read the folder can pose
+as any host. Depends on the package cryptography, of the extra zenoh, because the command line of OpenSSL is not
+everywhere and differs from version to version.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def make_authority(folder: Path, *, days: int) -> None:
 
     _refuse_to_overwrite(folder, AUTHORITY)
     key = ec.generate_private_key(ec.SECP256R1())
-    # Two of one name would be one to whoever checks, until the signatures of the one do not fit the other.
+    # Two authorities of one name look the same to a verifier, until the signatures of one do not fit the other.
     name = _name(f"hfg test authority {secrets.token_hex(4)}")
     usage = x509.KeyUsage(
         digital_signature=False,
@@ -86,7 +86,7 @@ def make_certificate(folder: Path, name: str, kind: Kind, *, hosts: Sequence[str
       days: how long it is valid.
 
     Raises:
-      TargetError: there is no authority, the files are there already or cannot be written, the name or a host is none,
+      TargetError: there is no authority, the files exist or cannot be written, the name or a host is not valid,
         or cryptography is not installed.
     """
     _library()
@@ -96,7 +96,7 @@ def make_certificate(folder: Path, name: str, kind: Kind, *, hosts: Sequence[str
     from cryptography.x509.oid import ExtendedKeyUsageOID
 
     if not name or len(name) > _LONGEST_NAME or "/" in name or name.startswith(".") or name == AUTHORITY:
-        raise TargetError(f'"{name}" is no name for a certificate: take up to {_LONGEST_NAME} letters, as in arm')
+        raise TargetError(f'"{name}" is not a name for a certificate: take up to {_LONGEST_NAME} letters, as in arm')
     _refuse_to_overwrite(folder, name)
     above, its_key = _authority(folder)
     key = ec.generate_private_key(ec.SECP256R1())
@@ -154,7 +154,7 @@ def _host(host: str) -> x509.GeneralName:
             raise ValueError
         return x509.DNSName(host)
     except ValueError:
-        raise TargetError(f'"{host}" is no host: take a name in ASCII or an address, as in arm.local') from None
+        raise TargetError(f'"{host}" is not a host: take a name in ASCII or an address, as in arm.local') from None
 
 
 def _authority(folder: Path) -> tuple[x509.Certificate, EllipticCurvePrivateKey]:
@@ -172,7 +172,7 @@ def _authority(folder: Path) -> tuple[x509.Certificate, EllipticCurvePrivateKey]
         ) from None
     except (ValueError, TypeError):
         raise TargetError(
-            f"{certificate} and {key} are no certificate and key; hfg keys new makes an authority"
+            f"{certificate} and {key} are not a certificate and a key; hfg keys new makes an authority"
         ) from None
     if not isinstance(loaded, EllipticCurvePrivateKey):
         raise TargetError(f"{key} is a key of another kind than hfg makes; {_MAKE_ONE}")
@@ -187,7 +187,7 @@ def _refuse_to_overwrite(folder: Path, name: str) -> None:
 
 
 def _write(folder: Path, name: str, certificate: x509.Certificate, key: EllipticCurvePrivateKey) -> None:
-    """Write both; the key can be read by nobody else from its first moment on."""
+    """Write both; no other user can read the key at any moment."""
     from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
     secret = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())

@@ -1,4 +1,4 @@
-"""`hfg check TARGET`: looks for mistakes without running. Stands on `target` and `show`."""
+"""`hfg check TARGET`: looks for mistakes without running. Depends on `target` and `show`."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def check(
             problems += error.problems
             refused_file = error
     if graph is not None:
-        refused = {problem.path.rpartition(" -> ")[2] for problem in problems}  # what follows from that is no news
+        refused = {problem.path.rpartition(" -> ")[2] for problem in problems}  # consequences of the refusals
         found = graph.check()
         problems += [one for one in found if not (one.check == "unconnected-input" and one.path in refused)]
     counts = {severity: sum(problem.severity == severity for problem in problems) for severity in SEVERITIES}
@@ -65,7 +65,7 @@ def check(
 
 
 def _unbuilt(target: str, error: TargetError, cause: Exception) -> Sequence[Problem]:
-    """The code that builds the graph failed: what can be said of it."""
+    """Return the problems of a graph whose code failed."""
     why = "so the graph is not there to be checked"
     if isinstance(cause, CheckFailed | FileError | MachineError):
         return cause.problems
@@ -79,7 +79,7 @@ def _unbuilt(target: str, error: TargetError, cause: Exception) -> Sequence[Prob
             severity="error",
             what=str(error),
             why=why,
-            remedy=f"mend the code that builds it{where}",
+            remedy=f"fix the code that builds it{where}",
             check="not-built",
         )
     ]

@@ -1,7 +1,7 @@
 """What the shell offers at the Tab key: targets, ports and parameters.
 
 The names of graphs are read from the text of a file, which is not run. Ports and parameters are known only when the
-graph is built, so there the target is imported, in silence; whatever goes wrong means no offer. Stands on `target`.
+graph is built, so there the target is imported, in silence; whatever goes wrong means no offer. Depends on `target`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """`hfg convert TARGET OUT`: writes a graph, or a file of CS::APEX, as a graph file, or the schema of such files.
 
-Stands on `target`, `show` and the files' floor.
+Depends on `target`, `show` and the files' floor.
 """
 
 from __future__ import annotations

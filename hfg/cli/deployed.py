@@ -1,7 +1,7 @@
-"""The process of a run that an agent has begun: `python -m hfg.cli.deployed`, which is told on its input what to run.
+"""The process of a run that an agent has begun: `python -m hfg.cli.deployed`, which reads from its input what to run.
 
 It is `hfg run`, and ends as that does by SIGTERM when its standard input ends: then the agent is gone, or wants it to
-end. Stands on `app`.
+end. Depends on `app`.
 """
 
 from __future__ import annotations

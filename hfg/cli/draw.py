@@ -1,4 +1,4 @@
-"""`hfg draw TARGET [OUT]`: shows what a graph looks like, without running it. Stands on `target` and `show`."""
+"""`hfg draw TARGET [OUT]`: shows what a graph looks like, without running it. Depends on `target` and `show`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`hfg info FILE`: says what is in a recording. Stands on `hfg.recording` and `show`."""
+"""`hfg info FILE`: says what is in a recording. Depends on `hfg.recording` and `show`."""
 
 from __future__ import annotations
 
@@ -39,16 +39,17 @@ def _lines(found: RecordingInfo) -> list[str]:
         outcome = f", {found.outcome}" if found.outcome else ""
         lines.append(f'graph "{found.graph}", {found.clock} clock{outcome}')
     else:
-        lines.append(f"written by {found.library or 'somebody who does not say'}")
+        lines.append(f"written by {found.library or 'an unknown program'}")
     rows = [(one.path, one.kind, one.type or one.schema, one.values, f"{one.rate_hz:.4g}") for one in found.ports]
     lines += ["", *table(("port", "kind", "type", "values", "Hz"), rows)]
     if found.markers:
         lines.append(f"and {found.markers} marker{'s' * (found.markers != 1)}")
     lines += [
-        f'{count} tokens of "{path}" were left out, for the disk was too slow' for path, count in found.left_out.items()
+        f'{count} tokens of "{path}" were skipped because the disk was too slow'
+        for path, count in found.left_out.items()
     ]
     lines += [
-        f'{count} values of "{path}" were left out, for they are no data' for path, count in found.refused.items()
+        f'{count} values of "{path}" were skipped because they are not data' for path, count in found.refused.items()
     ]
     if found.held_s:
         lines.append(f"nodes waited {found.held_s:.3f} s for the recording")

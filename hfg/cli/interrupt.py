@@ -7,7 +7,7 @@
        after 1.8 s: say who does not come back and leave ──────────────────────┘
     second Ctrl-C: leave at once
 
-A request to end (SIGTERM) and a terminal that goes away (SIGHUP) are treated alike. Stands on asyncio and signals;
+A request to end (SIGTERM) and a terminal that goes away (SIGHUP) are treated alike. Depends on asyncio and signals;
 knows neither graphs nor verbs.
 """
 
@@ -36,7 +36,7 @@ _LEAVE_WITHIN_S = 0.3
 
 
 class Interrupt:
-    """What Ctrl-C does in this process; one at a time.
+    """The handling of Ctrl-C in this process; one at a time.
 
     Attributes:
       count: how often it was pressed.
@@ -93,7 +93,7 @@ class Interrupt:
             self._run = None
 
     def _wake(self, loop: asyncio.AbstractEventLoop, on: bool) -> None:
-        """Let a signal wake the loop also if it arrives just before the loop begins to wait.
+        """Let a signal wake the loop even if it arrives just before the loop starts to wait.
 
         Python runs a handler between two of its own instructions only. asyncio's handlers come with a wake-up file for
         that case, so one that does nothing is registered, and ours is put back in its place.

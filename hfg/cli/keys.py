@@ -1,4 +1,4 @@
-"""`hfg keys new DIR` and `hfg keys add DIR NAME`: certificates to try links between hosts. Stands on certificates."""
+"""`hfg keys new DIR` and `hfg keys add DIR NAME`: certificates to try links between hosts. Depends on certificates."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The live table while a graph runs: four times a second a glance, drawn at the foot of the terminal.
 
-Stands on `terminal`, `table` and the engine.
+Depends on `terminal`, `table` and the engine.
 """
 
 from __future__ import annotations

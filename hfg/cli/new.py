@@ -1,4 +1,4 @@
-"""`hfg new node|graph|plugin NAME`: begins a file and its test, or a package. Stands on `templates`."""
+"""`hfg new node|graph|plugin NAME`: begins a file and its test, or a package. Depends on `templates`."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _file(named: str) -> Path:
 
 
 def _place(named: str) -> tuple[Path, str]:
-    """Give the folder and the name of the module that is meant, in snake case.
+    """Return the folder and the name of the module, in snake case.
 
     Raises:
       TargetError: no module can be named so.
@@ -104,7 +104,7 @@ def _place(named: str) -> tuple[Path, str]:
     if not module.isidentifier() or keyword.iskeyword(module) or module.startswith(("_", "test_")):
         raise TargetError(f'"{named}" names no module: letters, digits and _, no word of Python, as in map_lookup')
     if not module.isascii() or len(module) > _LONGEST_NAME:
-        raise TargetError(f'"{named}" is no good name for a file: take up to {_LONGEST_NAME} letters of a to z')
+        raise TargetError(f'"{named}" is not a good name for a file: take up to {_LONGEST_NAME} letters of a to z')
     if module in sys.stdlib_module_names or module == "hfg":
         raise TargetError(f'a module {module} would hide the module "{module}" of Python or hfg: take another name')
     if not place.parent.is_dir():

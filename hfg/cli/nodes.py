@@ -114,7 +114,7 @@ def _near(index: Index, words: str) -> str:
 
 
 def _meant(what: str | None) -> tuple[Catalogue, bool]:
-    """Give the types that are meant, and whether somebody asks for a type of that name."""
+    """Return the matching types, and whether the request names one type."""
     if what is None:
         return catalogue.installed(), False
     from hfg.cli import target  # imports the graph layer, which a search does without

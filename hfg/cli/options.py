@@ -20,8 +20,10 @@ __all__ = [
     "Clock",
     "ClockOption",
     "DebugOption",
+    "ForceOption",
     "ParamOption",
     "SettingsOption",
+    "TableOption",
     "TargetArgument",
     "UntilOption",
     "VerboseOption",
@@ -79,9 +81,11 @@ SettingsOption = Annotated[
     str | None,
     typer.Option(metavar="FILE", help="Settings of the realm (TOML): addresses of agents and other hosts."),
 ]
+TableOption = Annotated[bool, typer.Option(help="Show a live table of nodes (on a terminal and the real clock).")]
 DebugOption = Annotated[
     bool, typer.Option("--debug", help="Check values against port types; show hfg's own frames in tracebacks.")
 ]
+ForceOption = Annotated[bool, typer.Option("--force", help="Replace an existing file.")]
 VerboseOption = Annotated[
     int, typer.Option("-v", "--verbose", count=True, help="Report each node; with -vv, each edge.")
 ]

@@ -1,7 +1,4 @@
-"""`hfg record TARGET -o FILE`: runs a graph and writes what passes its ports.
-
-Stands on `execute`, `live`, `target`, `settings`, `interrupt` and `show`.
-"""
+"""`hfg record TARGET -o FILE`: runs a graph and records its ports. Depends on `execute`."""
 
 from __future__ import annotations
 
@@ -14,23 +11,20 @@ from typing import Annotated
 import typer
 
 from hfg.cli import show
-from hfg.cli.execute import execute
-from hfg.cli.interrupt import Interrupt
-from hfg.cli.live import live_table
+from hfg.cli.execute import GraphRun
 from hfg.cli.options import (
     AllowOption,
     ArgOption,
     Clock,
     ClockOption,
     DebugOption,
+    ForceOption,
     ParamOption,
+    TableOption,
     TargetArgument,
     UntilOption,
 )
-from hfg.cli.settings import set_parameters
-from hfg.cli.target import load_graph
 from hfg.engine import Run
-from hfg.engine.runtime.interrupt import named
 from hfg.recording import Recording
 from hfg.recording import record as begin_recording
 
@@ -56,50 +50,29 @@ def record(
     lossless: Annotated[bool, typer.Option(help="Let nodes wait for a slow disk, or skip tokens instead.")] = True,
     images: Annotated[_Images, typer.Option(help="Image format; png is lossless.")] = _Images.raw,
     pickle: Annotated[bool, typer.Option("--pickle", help="Pickle values that are not plain data.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    force: ForceOption = False,
     clock: ClockOption = Clock.real,
     until: UntilOption = None,
     param: ParamOption = None,
     arg: ArgOption = None,
     allow: AllowOption = None,
-    table: Annotated[bool, typer.Option(help="Show a live table of nodes (on a terminal and the real clock).")] = True,
+    table: TableOption = True,
     debug: DebugOption = False,
 ) -> int:
     """Run a graph and record its ports for hfg play, hfg info and Foxglove. Ctrl-C ends the recording properly."""
-    show.set_debug(debug)
-    records = show.Records(0, debug, virtual=clock is Clock.virtual)
-    graph = load_graph(target, arg or [], allow)
-    records.loaded()
-    set_parameters(graph, param or [])
-    interrupt = Interrupt.current or Interrupt()
+    running = GraphRun.load(target, clock, param=param, arg=arg, allow=allow, debug=debug)
     recordings: list[Recording] = []
-    with redirect_stdout(sys.stderr), live_table(table and clock is Clock.real) as live:
-        interrupt.before_leaving.append(live.leave)
+    with redirect_stdout(sys.stderr), running.table(table) as live:
 
         def begin(run: Run) -> None:
-            recordings.append(
-                begin_recording(
-                    run,
-                    output,
-                    select=select or "*",
-                    lossless=lossless,
-                    images=images.value,
-                    pickle=pickle,
-                    force=force,
-                )
-            )
-            recordings[0].when_failed = run.stop  # for what is a run that nobody records?
+            how = {"lossless": lossless, "images": images.value, "pickle": pickle, "force": force}
+            recordings.append(begin_recording(run, output, select=select or "*", **how))  # type: ignore[arg-type]
+            recordings[0].when_failed = run.stop  # the run has no other purpose
             live.begin(run)
 
-        report, error = execute(graph, target, clock, interrupt, begin, until_s=until, debug=debug)
+        running.run(begin, until_s=until, debug=debug)
     code = told(recordings[0]) if recordings else 1
-    if error is not None:
-        show.failure(error)
-    if interrupt.count:
-        show.sentence(f"{named(graph)}: interrupted; what came back is torn down")
-    elif report is not None and error is None:
-        show.report(graph.name, report, 0)
-    return 1 if error is not None or interrupt.count else code
+    return running.ended() or code
 
 
 def told(recording: Recording) -> int:

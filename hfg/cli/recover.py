@@ -1,4 +1,4 @@
-"""`hfg recover FILE -o OUTPUT`: makes a complete recording of one that is damaged or was cut off. Stands on `show`."""
+"""`hfg recover FILE -o OUTPUT`: makes a complete recording of one that is damaged or was cut off. Depends on `show`."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import typer
 
 from hfg.cli import show
 from hfg.cli.info import told_losses
+from hfg.cli.options import ForceOption
 from hfg.errors import TargetError, UsageError
 from hfg.recording import recover as recover_recording
 
@@ -18,7 +19,7 @@ __all__ = ["recover"]
 def recover(
     file: Annotated[Path, typer.Argument(help="a recording, or any MCAP file")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="The new recording.")],
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    force: ForceOption = False,
 ) -> int:
     """Write everything that can be read from a damaged recording to a new file, and report what is lost."""
     try:

@@ -1,7 +1,4 @@
-"""`hfg run TARGET`: runs a graph to its end and tells how it went.
-
-Stands on `execute`, `live`, `target`, `settings`, `interrupt` and `show`.
-"""
+"""`hfg run TARGET`: runs a graph to its end and reports how it went. Depends on `execute`."""
 
 from __future__ import annotations
 
@@ -17,9 +14,7 @@ import typer
 
 from hfg.base.whole import GrowingFile
 from hfg.cli import show
-from hfg.cli.execute import execute
-from hfg.cli.interrupt import Interrupt
-from hfg.cli.live import live_table
+from hfg.cli.execute import GraphRun
 from hfg.cli.options import (
     AllowOption,
     ArgOption,
@@ -28,19 +23,16 @@ from hfg.cli.options import (
     DebugOption,
     ParamOption,
     SettingsOption,
+    TableOption,
     TargetArgument,
     UntilOption,
     VerboseOption,
     with_run_options,
 )
-from hfg.cli.settings import set_parameters
-from hfg.cli.target import load_graph
 from hfg.engine import Run
 from hfg.engine.observing.encoding import encode
 from hfg.engine.observing.report import RunPage
-from hfg.engine.runtime.interrupt import named
-from hfg.errors import HfgError, TargetError
-from hfg.graph import Graph
+from hfg.errors import TargetError
 from hfg.timeline import Timeline
 from hfg.trace import TraceEvent
 
@@ -74,7 +66,7 @@ def run(
         ),
     ] = None,
     pictures: Annotated[int, typer.Option(metavar="N", help="With --report: show at most N images.")] = 24,
-    table: Annotated[bool, typer.Option(help="Show a live table of nodes (on a terminal and the real clock).")] = True,
+    table: TableOption = True,
     json: Annotated[
         bool, typer.Option("--json", help="Write the report as JSON. Output of nodes goes to standard error.")
     ] = False,
@@ -83,69 +75,40 @@ def run(
     **options: Any,  # those that declare a flag
 ) -> int:
     """Run a graph. Ctrl-C stops it; a second Ctrl-C stops it immediately."""
-    show.set_debug(debug)
-    records = show.Records(verbose, debug, virtual=clock is Clock.virtual)
-    graph = load_graph(target, arg or [], allow)
-    records.loaded()
-    set_parameters(graph, param or [])
-    interrupt = Interrupt.current or Interrupt()
+    running = GraphRun.load(target, clock, param=param, arg=arg, allow=allow, debug=debug, verbose=verbose)
     output = _Output(sys.stdout)
     unwritten: list[str] = []
+    pages: list[RunPage] = []
     with (
         redirect_stdout(sys.stderr if json else output),
-        _writing(trace, graph, interrupt, unwritten) as write,
-        live_table(table and not json and clock is Clock.real) as live,
+        _writing(trace, running, unwritten) as write,
+        running.table(table and not json) as live,
     ):
-        interrupt.before_leaving.append(live.leave)
-
-        pages: list[RunPage] = []
 
         def begin(run: Run) -> None:
             output.when_broken = partial(asyncio.get_running_loop().call_soon_threadsafe, run.stop)
             if report_file is not None:
                 pages.append(run.report_page(report_file, pictures=pictures))
-                interrupt.before_leaving.append(pages[0].write)
+                running.interrupt.before_leaving.append(pages[0].write)
             live.begin(run)
 
-        report, error = execute(
-            graph,
-            target,
-            clock,
-            interrupt,
-            begin,
-            until_s=until,
-            debug=debug,
-            trace=write,
-            settings=settings,
-            **options,
-        )
+        running.run(begin, until_s=until, debug=debug, trace=write, settings=settings, **options)
     for page in pages:
         if page.error is not None:
             show.sentence(f'the report "{page.path}" cannot be written: {page.error.strerror}')
             unwritten.append(str(page.path))
     if output.broken is not None:
         raise output.broken
-    if json and report is not None:
-        show.json(report)
-    if error is None and report is not None and not interrupt.count and (not json or verbose):
-        show.report(graph.name, report, verbose)
-    return _ended(graph, error, interrupt) or (1 if unwritten else 0)
-
-
-def _ended(graph: Graph, error: HfgError | None, interrupt: Interrupt) -> int:
-    """Say what went wrong, if anything did."""
-    if error is not None:
-        show.failure(error)
-    if interrupt.count:
-        show.sentence(f"{named(graph)}: interrupted; what came back is torn down")
-    return 1 if interrupt.count or error is not None else 0
+    if json and running.report is not None:
+        show.json(running.report)
+    return running.ended(verbose=verbose, reports=not json or verbose > 0) or int(bool(unwritten))
 
 
 @contextmanager
 def _writing(
-    file: Path | None, graph: Graph, interrupt: Interrupt, unwritten: list[str]
+    file: Path | None, running: GraphRun, unwritten: list[str]
 ) -> Iterator[Callable[[TraceEvent], None] | None]:
-    """Open the trace file; it is whole however the run ends, or among those unwritten.
+    """Open the trace file; it is complete however the run ends, or listed in `unwritten`.
 
     One that ends in .json becomes a timeline.
     """
@@ -154,8 +117,8 @@ def _writing(
         return
     if file.suffix not in _TRACES:
         raise TargetError(
-            f"the trace cannot be written as {file}: name it {file.with_suffix('.jsonl').name}, one JSON object a "
-            f"line, or {file.with_suffix('.json').name}, a timeline"
+            f"the trace cannot be written as {file}: name it {file.with_suffix('.jsonl').name}, one JSON object "
+            f"per line, or {file.with_suffix('.json').name}, a timeline"
         )
     try:
         stream: Any = _Stream(file)
@@ -163,11 +126,11 @@ def _writing(
         raise TargetError(f"the trace cannot be written to {file}: {error.strerror}") from None
     try:
         if file.suffix == ".json":
-            with Timeline(stream, graph) as timeline:
-                interrupt.before_leaving += [timeline.close, stream.close]
+            with Timeline(stream, running.graph) as timeline:
+                running.interrupt.before_leaving += [timeline.close, stream.close]
                 yield timeline
         else:
-            interrupt.before_leaving.append(stream.close)
+            running.interrupt.before_leaving.append(stream.close)
             yield lambda event: _write(stream.write, event)
     finally:
         stream.close()
@@ -175,7 +138,7 @@ def _writing(
 
 
 class _Stream:
-    """A file whose disk may become full: that is told once, and the run goes on.
+    """A file whose disk may become full: this is reported once, and the run continues.
 
     Attributes:
       is_broken: whether it lacks something.
@@ -197,7 +160,7 @@ class _Stream:
         self._try(self._file.flush)
 
     def close(self) -> None:
-        """Give it its name, if it is whole."""
+        """Move it to its name, if it is complete."""
         if not self._is_closed:
             self._is_closed = True
             self._try(self._file.complete)
@@ -213,7 +176,7 @@ class _Stream:
 
 
 class _Output:
-    """Stands in for standard output: when nobody reads it any more, as in `hfg run ... | head`, the run is stopped.
+    """Replaces standard output: when its reader is gone, as in `hfg run ... | head`, the run is stopped.
 
     Attributes:
       broken: why nothing can be written any more.

@@ -1,6 +1,6 @@
 """`hfg ps`, `hfg deploy`, `hfg logs`, `hfg restart` and `hfg stop`: agents and runs of a realm, from any of its hosts.
 
-Stands on `hfg.parts.hosts.realm`.
+Depends on `hfg.parts.hosts.realm`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from hfg.parts.transports import open_session
 
 __all__ = ["RealmLine", "deploy", "logs", "ps", "restart", "stop"]
 
-_SETTLES_S: Final = 0.3  # who is there is told within this, once somebody is
+_SETTLES_S: Final = 0.3  # how long presences take to arrive after the first one
 _LOOKS_AGAIN_S: Final = 0.5
 _BEGINS_S: Final = 60.0
 _ENDS_S: Final = 15.0
@@ -175,7 +175,7 @@ def _find(realm: Realm, name: str | None) -> RunIs:
     raise TargetError(
         f'no run "{name}" is in the realm; there is {there}'
         if there
-        else f'no run "{name}" is in the realm, nor any other: hfg deploy begins one, or hfg run with --settings'
+        else f'no run "{name}" is in the realm, nor any other: hfg deploy starts one, or hfg run with --settings'
     )
 
 
@@ -196,7 +196,7 @@ async def _ps(settings: str | None, json: bool) -> int:
         show.json({"agents": [_plain(agent) for agent in agents], "runs": told})
         return 0
     if not agents and not runs:
-        show.sentence("nobody is in the realm: hfg agent begins an agent")
+        show.sentence("the realm is empty: hfg agent starts an agent")
         return 0
     show.table("agents", ("host", "process", "hfg", "python"), [(a.host, a.process, a.hfg, a.python) for a in agents])
     rows = [
@@ -241,8 +241,8 @@ async def _deploy(settings: str | None, target: str, on: str | None, arguments: 
             told = await _ask_agent(realm, agent, requests.ReadLog(order.run, 0))
             show.write(told.text, to_stderr=True)
             if not has_failed:
-                return 0  # it was over before anybody could look
-            show.sentence(f'{target} has not begun on host "{host}"; what it wrote is above')
+                return 0  # it was over before the first look
+            show.sentence(f'{target} has not started on host "{host}"; what it wrote is above')
             return 1
         gone.cancel()
     show.write(f"{run}\n")
@@ -306,7 +306,7 @@ def _time_of(line: str) -> str:
 
 
 async def _read_all(realm: Realm, place: str, agent: AgentIs, run: str, offsets: dict[str, int]) -> list[str]:
-    """What is new on one host, each line with its name behind the time."""
+    """Return new lines of one host, each with the name of the host after the time."""
     lines: list[str] = []
     while True:
         try:
@@ -341,16 +341,17 @@ async def _stop(settings: str | None, name: str) -> int:
             show.sentence(f"run {run.run} did not answer; its process was ended")
             return 1
         show.sentence(
-            f'run {run.run} does not answer, and no agent has begun it: end process {run.process} on host "{run.host}"'
+            f"run {run.run} does not answer, and no agent has started it: end process {run.process} on host "
+            f'"{run.host}"'
         )
         return 1
 
 
 def _need_permission(run: RunIs, parts: list[requests.PartIs]) -> None:
-    """Who may not steer gets no answer: nobody tells him, but that what only tells is answered.
+    """Check whether a run does not answer because the settings permit only reading.
 
     Raises:
-      TargetError: so it is.
+      TargetError: the run answers requests that only read.
     """
     if parts[0].state != "does not answer":
         raise TargetError(
@@ -369,5 +370,5 @@ async def _restart(settings: str | None, name: str, group: str) -> int:
             raise
         except QueryRefused as error:
             raise TargetError(str(error)) from None
-        show.sentence(f'group "{group}" of run {run.run} begins anew')
+        show.sentence(f'group "{group}" of run {run.run} is restarted')
     return 0

@@ -1,6 +1,6 @@
 """`--param path=value`: finds the parameter, reads the value by its declared type and sets it.
 
-Stands on the graph floor.
+Depends on the graph floor.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def _set(port: ParameterPort[Any], path: str, text: str) -> None:
 
 
 def _literal(text: str) -> Any:
-    """What the text looks like, for a message."""
+    """Return the value that the string looks like, for a message."""
     try:
         return ast.literal_eval(text.strip())
     except (ValueError, SyntaxError, MemoryError, RecursionError):

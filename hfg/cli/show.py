@@ -1,6 +1,6 @@
 """How things look on a terminal: one-sentence errors, tracebacks that begin in the user's code, tables, JSON.
 
-Stands on rich and `encoding`; knows reports and problems, no verbs.
+Depends on rich and `encoding`; knows reports and problems, no verbs.
 """
 
 from __future__ import annotations
@@ -114,14 +114,14 @@ class _StandardError:
 def write(text: str, *, to_stderr: bool = False) -> None:
     """Write a text to standard output; whatever verbs write comes by here, so that no name or value steers a terminal.
 
-    What nodes print themselves does not.
+    Output of nodes does not come by here.
     """
     (sys.stderr if to_stderr else sys.stdout).write(escaped(text))
 
 
 def sentence(text: str) -> None:
     """Write one sentence to standard error."""
-    with suppress(OSError):  # the terminal has gone away: nobody reads it
+    with suppress(OSError):  # the terminal is gone
         write(f"hfg: {text}\n", to_stderr=True)
 
 
@@ -159,7 +159,7 @@ def _filter(shown: traceback.TracebackException) -> None:
     kept: list[traceback.FrameSummary] = []
     ours = False
     for frame in shown.stack:
-        # What Python's library does for machinery belongs to it.
+        # Calls of Python's library by hfg belong to hfg.
         ours = is_machinery(frame.filename) or (ours and is_standard(frame.filename))
         if not ours:
             kept.append(frame)
@@ -167,7 +167,7 @@ def _filter(shown: traceback.TracebackException) -> None:
     for other in (shown.__cause__, shown.__context__, *(shown.exceptions or ())):
         if other is not None:
             _filter(other)
-    # What hfg made another error of is told by that one.
+    # If hfg has replaced the error, the other one reports it.
     if shown.__cause__ is not None and _is_empty(shown.__cause__):
         shown.__cause__, shown.__suppress_context__ = None, True
     if shown.__context__ is not None and _is_empty(shown.__context__):

@@ -1,6 +1,6 @@
 """Looks at runs in other processes, through the sockets that they listen at.
 
-Stands on `show` and `engine.face.watching`.
+Depends on `show` and `engine.face.watching`.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Line:
         return answer
 
     def lines(self) -> Iterator[str]:
-        """What a tap tells, line by line, until the run is over or the tap is closed over there."""
+        """Yield the lines of a tap, until the run is over or the run closes the tap."""
         self._socket.settimeout(None)
         while True:
             *whole, self._heard = self._heard.split(b"\n")

@@ -26,7 +26,7 @@ _BOLD, _DIM, _GREEN, _RED = "1", "2", "32", "31"
 
 
 class Row(NamedTuple):
-    """What the table says of one node.
+    """The values of one node in the table.
 
     Attributes:
       rate_hz: firings and calls a second of the run's clock, over the last second.
@@ -87,7 +87,7 @@ class View:
         return next((old, before[node.path]) for old, before in self._glances if node.path in before)
 
     def rows(self) -> list[Row]:
-        """The rows of all nodes, in order of adding; with one glance alone nothing has a rate yet."""
+        """The rows of all nodes, in order of adding; with only one glance, nothing has a rate yet."""
         new, _ = self._glances[-1]
         rows = []
         for node in new.nodes:
@@ -110,7 +110,7 @@ class View:
         return rows
 
     def lines(self, columns: int, height: int, *, coloured: bool = False) -> list[str]:
-        """Draw the table into so many columns and rows of a terminal.
+        """Draw the table into the columns and rows of a terminal.
 
         Where there is no room for all nodes the busiest are shown, and how many are not.
         """

@@ -1,6 +1,6 @@
 """`hfg tap TARGET PATH`: prints the tokens that pass a port or an edge of a graph, which it runs or which runs already.
 
-Stands on `execute`, `sockets`, `target`, `settings`, `interrupt` and `show`.
+Depends on `execute` and `sockets`.
 """
 
 from __future__ import annotations
@@ -17,16 +17,13 @@ import typer
 
 from hfg.base.controls import escaped
 from hfg.cli import completing, show
-from hfg.cli.execute import execute
-from hfg.cli.interrupt import Interrupt
+from hfg.cli.execute import GraphRun
 from hfg.cli.options import AllowOption, Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
-from hfg.cli.settings import set_parameters
 from hfg.cli.sockets import Line, find, is_process, which
-from hfg.cli.target import SUFFIXES, import_from_here, load_graph
+from hfg.cli.target import SUFFIXES, import_from_here
 from hfg.engine import Run
 from hfg.engine.face.watching import Answer, Question
 from hfg.engine.observing.encoding import line_of
-from hfg.engine.runtime.interrupt import named
 from hfg.errors import GraphError, TargetError, UsageError
 
 __all__ = ["tap"]
@@ -60,34 +57,27 @@ def tap(
     that run instead.
     """
     show.set_debug(debug)
-    records = show.Records(0, debug, virtual=clock is Clock.virtual)
     if there := _runs_already(target):
         if param or until is not None or clock is not Clock.real:
             raise TargetError(
-                f"the run {target} goes on as it is, it is only looked at: leave out --param, --until and --clock"
+                f"the run {target} is only watched and not changed: leave out --param, --until and --clock"
             )
         if len(there) > 1:
             return which("tap", there)
         return _look_at(there[0].name, Question("tap", path, rate, json), limit)
-    graph = load_graph(target, (), allow)
-    records.loaded()
-    set_parameters(graph, param or [])
-    interrupt = Interrupt.current or Interrupt()
+    running = GraphRun.load(target, clock, param=param, allow=allow, debug=debug)
     printer = _Printer(path, limit, rate, json)
     with redirect_stdout(sys.stderr):
-        report, error = execute(graph, target, clock, interrupt, printer.begin, until_s=until, debug=debug)
+        running.run(printer.begin, until_s=until, debug=debug)
     if printer.broken is not None:
         raise printer.broken
-    if error is not None:
-        show.failure(error)
+    code = running.ended(reports=False)
     if printer.skipped and rate is None:
         tokens = "1 token was" if printer.skipped == 1 else f"{printer.skipped} tokens were"
         show.sentence(f"{tokens} skipped: more passed than could be printed")
-    if not printer.seen and report is not None:
-        show.sentence(f'no token passed "{path}" in {report.duration_s:.3f} s')
-    if interrupt.count:
-        show.sentence(f"{named(graph)}: interrupted; what came back is torn down")
-    return 1 if error is not None or interrupt.count else 0
+    if not printer.seen and running.report is not None:
+        show.sentence(f'no token passed "{path}" in {running.report.duration_s:.3f} s')
+    return code
 
 
 def _runs_already(target: str) -> list[Answer]:
@@ -107,7 +97,7 @@ def _runs_already(target: str) -> list[Answer]:
 
 
 def _look_at(name: str, question: Question, limit: int | None) -> int:
-    """Print what passes in the run of another process, until that is over or nobody wants more."""
+    """Print the tokens in the run of another process, until it is over or the limit is reached."""
     with Line(name) as line:
         if line.ask(question) is None:
             raise TargetError(f"the run in process {name} does not answer: a node blocks its loop")
@@ -127,7 +117,7 @@ class _Printer:
 
     Attributes:
       seen: how many tokens have passed; known when the run is over.
-      skipped: how many of them were not printed, but for those behind the limit.
+      skipped: how many of them were not printed, except those after the limit.
       broken: why nothing can be printed any more.
     """
 

@@ -1,7 +1,7 @@
-"""Finds what TARGET names: a graph, or what makes one, in a module or Python file, or a file that says a graph.
+"""Finds the graph of a TARGET: in a module or Python file, as a graph or a function that builds one, or a graph file.
 
-That is `module:graph`, `file.py`, `file.py:graph`, `file.hfg.yaml` or `file.apex`. A file or module is imported as
-Python itself would import it. Stands on `arguments`, the files' floor and the graph floor.
+A target is `module:graph`, `file.py`, `file.py:graph`, `file.hfg.yaml` or `file.apex`. A file or module is imported as
+Python itself would import it. Depends on `arguments`, the files' floor and the graph floor.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ SUFFIXES: Final = (".apex", ".apexs")
 
 
 def load_graph(target: str, given: Sequence[str] = (), allow: Sequence[str] | None = None) -> Graph:
-    """Import the target and give back its graph, built if need be.
+    """Import the target. Return its graph, which is built if necessary.
 
     Args:
       target: as users write it.
@@ -39,12 +39,12 @@ def load_graph(target: str, given: Sequence[str] = (), allow: Sequence[str] | No
 
     Raises:
       FileError: a graph file describes no graph.
-      TargetError: there is no such file, module or name, its code fails, or what it names is no graph; `__cause__` is
+      TargetError: there is no such file, module or name, its code fails, or the name is not of a graph; `__cause__` is
         the user's exception.
     """
     if target.endswith((".yaml", ".yml")):
         if given:
-            raise TargetError(f"{target} is a graph file, no function, so --arg {given[0]} means nothing to it")
+            raise TargetError(f"{target} is a graph file, not a function, so --arg {given[0]} means nothing to it")
         return load(target, allow=allow or ())
     if target.endswith(SUFFIXES):
         for option, values in (("--arg", given), ("--allow", allow)):
@@ -74,7 +74,7 @@ def load_graph(target: str, given: Sequence[str] = (), allow: Sequence[str] | No
         raise TargetError(f"{place}: {_name(found)}() is async; let a plain function build the graph")
     if not isinstance(graph, Graph):
         raise TargetError(
-            f"{place}: {_name(found)}() gave back {_a(graph)}, not a Graph: return the graph that it builds"
+            f"{place}: {_name(found)}() returned {_a(graph)}, not a Graph: return the graph that it builds"
         )
     return graph
 
@@ -86,13 +86,13 @@ def load_module(place: str) -> ModuleType:
       TargetError: it is not there, or its code fails.
     """
     if place.endswith((".yaml", ".yml")):
-        raise TargetError(f"{place} is a graph file, no module; name a Python file or a module")
+        raise TargetError(f"{place} is a graph file, not a module; name a Python file or a module")
     if place.endswith(".py") or "/" in place or "\\" in place:
         return _load_file(Path(place))
     if Path(place).is_file():
-        raise TargetError(f"{place} is no Python file: name one that ends in .py, or a module that builds the graph")
+        raise TargetError(f"{place} is not a Python file: name one that ends in .py, or a module that builds the graph")
     if place.startswith("."):
-        raise TargetError(f'"{place}" is no module; name one from here on, as in package.module, or a file')
+        raise TargetError(f'"{place}" is not a module; name one from here on, as in package.module, or a file')
     import_from_here()
     try:
         return importlib.import_module(place)
@@ -155,7 +155,7 @@ def _import_from(folder: Path) -> None:
 
 def _split(target: str) -> tuple[str, str]:
     place, colon, name = target.rpartition(":")
-    if colon and not ("/" in name or "\\" in name):  # the colon of C:\\graph.py is none of ours
+    if colon and not ("/" in name or "\\" in name):  # not the colon of C:\\graph.py
         if not place or not name:
             raise TargetError(f'"{target}" names nothing: write module:graph, file.py or file.py:graph')
         return place, name
@@ -176,7 +176,9 @@ def _named(module: ModuleType, name: str, place: str, has_arguments: bool) -> An
         raise TargetError(
             f"{place}:{name} needs arguments to build a graph: {_signature(found)}; give them, as in --arg NAME=VALUE"
         )
-    raise TargetError(f"{place}:{name} is {_a(found)}, no Graph and no function that builds one; {_there_are(module)}")
+    raise TargetError(
+        f"{place}:{name} is {_a(found)}, not a Graph and not a function that builds one; {_there_are(module)}"
+    )
 
 
 def _only(module: ModuleType, place: str, has_arguments: bool) -> Any:

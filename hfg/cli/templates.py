@@ -1,4 +1,4 @@
-"""What `hfg new` writes: the text of a node type, a graph or a package, and of its test. Stands on nothing."""
+"""What `hfg new` writes: the text of a node type, a graph or a package, and of its test. Depends on nothing."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Lines at the foot of a terminal that change in place, below whatever else is printed meanwhile.
 
-What goes to standard output and standard error comes out exactly as it was written, above the lines. Nothing is left
-to restore when the process dies: the cursor stays as it is, and there is no second screen. Stands on `controls`.
+Text for standard output and standard error appears exactly as it was written, above the lines. Nothing is left
+to restore when the process dies: the cursor stays as it is, and there is no second screen. Depends on `controls`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def is_terminal(*streams: TextIO) -> bool:
 class Foot:
     """Draws lines at the foot of a terminal, again and again.
 
-    A terminal that goes away is drawn on no more; nobody else notices.
+    When the terminal goes away, drawing stops without an error.
 
     Attributes:
       coloured: whether colours are welcome there (https://no-color.org).
@@ -41,8 +41,8 @@ class Foot:
         self._lines: Sequence[str] = ()
         self._widths: list[int] = []
         self._gone = False
-        self._part = ""  # of a line that somebody has written and not ended; ours stand below it
-        self._in_a_line = False  # it may be a prompt: the lines wait. If more of it comes, it is none
+        self._part = ""  # of a line that was not ended; the drawn lines are below it
+        self._in_a_line = False  # it may be a prompt: the lines wait. If more of it comes, it is not a prompt
         self._lock = threading.RLock()
         self.coloured = not os.environ.get("NO_COLOR")
 
@@ -61,7 +61,7 @@ class Foot:
         try:
             return bool(select.select((), (self._stream,), (), 0)[1])
         except (OSError, ValueError):
-            return os.name != "posix"  # where select is for sockets alone
+            return os.name != "posix"  # where select is only for sockets
 
     def draw(self, lines: Sequence[str], widths: list[int] | None = None) -> None:
         """Show these lines in place of those before, each no wider than the terminal."""
@@ -84,7 +84,7 @@ class Foot:
                 self._lines = ()
 
     def leave(self) -> None:
-        """Take the lines away for good; waits for nobody who draws at the moment."""
+        """Remove the lines permanently, without waiting long for a thread that draws."""
         if self._lock.acquire(timeout=0.1):
             try:
                 self.clear()

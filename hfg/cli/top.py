@@ -1,6 +1,6 @@
 """`hfg top [RUN]`: the live table of a graph that runs in another process, or on another host of the realm.
 
-Stands on `sockets`, `runs`, `table`, `terminal` and `show`.
+Depends on `sockets`, `runs`, `table`, `terminal` and `show`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Which verbs there are; the module of one is imported when somebody uses it, for most stand on much.
+"""The list of verbs. The module of a verb is imported when the verb is used, because most modules import much.
 
-A module offers functions with the names of its verbs, or `verbs`, which has several below one name. What the list of
-verbs says of them is their docstrings, taken from the compiled modules.
+A module offers functions with the names of its verbs, or `verbs`, which has several below one name. The help
+texts in the list are their docstrings, taken from the compiled modules.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def _said(name: str) -> str | None:
 
 @functools.cache
 def _compiled(module: str) -> CodeType:
-    """Give a module's code as Python keeps it, without running it."""
+    """Return a module's code as Python caches it, without running it."""
     name = f"{__package__}.{module}"
     code = SourceFileLoader(name, str(Path(__file__).with_name(f"{module}.py"))).get_code(name)
     assert code is not None

@@ -53,8 +53,8 @@ def test_an_agent_whose_port_is_taken(alone: Path, capsys: pytest.CaptureFixture
 @pytest.mark.parametrize(
     ("arguments", "code", "sentence"),
     [
-        (["ps"], 0, "nobody is in the realm: hfg agent begins an agent"),
-        (["stop", "robot"], 2, 'no run "robot" is in the realm, nor any other: hfg deploy begins one'),
+        (["ps"], 0, "the realm is empty: hfg agent starts an agent"),
+        (["stop", "robot"], 2, 'no run "robot" is in the realm, nor any other: hfg deploy starts one'),
         (["logs", "robot"], 2, 'no run "robot" is in the realm'),
         (["top", "robot"], 2, 'no run "robot" is in the realm'),
         (["restart", "robot/far"], 2, 'no run "robot" is in the realm'),

@@ -320,7 +320,7 @@ def test_check_tells_at_once_all_that_a_graph_refuses_and_what_else_is_wrong(hfg
     ("code", "found"),
     [
         ("{}['key']", "failed() failed: KeyError: 'key'"),
-        ("return 3", "gave back an int, not a Graph"),
+        ("return 3", "returned an int, not a Graph"),
         ("graph.add(3)", "graph.add takes a node, got 3"),
         ("graph.add(half(), name='a/b')", 'cannot be named "a/b"'),
     ],

@@ -56,7 +56,10 @@ def test_the_schema_knows_node_types_of_an_allowed_module_of_the_current_folder(
         (["convert"], "there is no TARGET: write hfg convert graph.py graph.hfg.yaml"),
         (["convert", "steps.py:build", "steps.yaml"], "steps.yaml is no name of a graph file; call it steps.hfg.yaml"),
         (["convert", "--schema", "a", "b"], "--schema needs no TARGET"),
-        (["run", "steps.hfg.yaml", "--arg", "count=3"], "is a graph file, no function, so --arg count=3 means nothing"),
+        (
+            ["run", "steps.hfg.yaml", "--arg", "count=3"],
+            "is a graph file, not a function, so --arg count=3 means nothing",
+        ),
         (["run", "steps.py:build", "--allow", "x"], "is code, which imports what it likes, so --allow x means nothing"),
         (["run", "missing.hfg.yaml"], "missing.hfg.yaml: there is no such file"),
     ],

@@ -69,9 +69,9 @@ def test_keys_are_never_overwritten(command: Command, tmp_path: Path) -> None:
     ("arguments", "sentence"),
     [
         (["add", "nowhere", "arm"], "authority.pem cannot be read: No such file or directory; hfg keys new makes an"),
-        (["add", "keys", "a/b"], '"a/b" is no name for a certificate: take up to 64 letters, as in arm'),
-        (["add", "keys", "authority"], '"authority" is no name for a certificate'),
-        (["add", "keys", "arm", "--host", "größe"], '"größe" is no host: take a name in ASCII or an address'),
+        (["add", "keys", "a/b"], '"a/b" is not a name for a certificate: take up to 64 letters, as in arm'),
+        (["add", "keys", "authority"], '"authority" is not a name for a certificate'),
+        (["add", "keys", "arm", "--host", "größe"], '"größe" is not a host: take a name in ASCII or an address'),
         (["new", "file/keys"], "cannot be written: Not a directory"),
     ],
 )
@@ -87,7 +87,8 @@ def test_wrong_use_is_one_sentence(command: Command, tmp_path: Path, arguments: 
 def test_a_file_that_is_no_authority_is_named(command: Command, tmp_path: Path) -> None:
     command("keys", "new", "keys")
     (tmp_path / "keys/authority.pem").write_text("hello")
-    assert "are no certificate and key; hfg keys new makes an authority" in command("keys", "add", "keys", "arm").err
+    said = command("keys", "add", "keys", "arm").err
+    assert "are not a certificate and a key; hfg keys new makes an authority" in said
 
 
 def test_without_cryptography_the_remedy_is_named(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:

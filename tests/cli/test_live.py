@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 import hfg
-from hfg.cli import run
+from hfg.cli import execute
 from hfg.cli.live import EVERY_S, Live, live_table
 from hfg.cli.terminal import Foot
 from tests.cli.conftest import STEPS, Command
@@ -119,7 +119,7 @@ def test_the_table_is_for_terminals_and_the_real_clock_and_not_beside_json(
         with live_table(wants) as live:
             yield live
 
-    monkeypatch.setattr(run, "live_table", asked)
+    monkeypatch.setattr(execute, "live_table", asked)
     for options in ((), ("--json",), ("--no-table",), ("--clock", "virtual")):
         command("run", "steps.py:build", "--until", "0", *options)
     assert wanted == [True, False, False, False]

@@ -156,7 +156,7 @@ LEAVES_A_PROGRAM = """
 LEAVES_THE_COMMAND = """
     import os, signal
     import hfg
-    from hfg.cli.execute import execute
+    from hfg.cli.execute import GraphRun
     from hfg.cli.interrupt import Interrupt
     from hfg.cli.options import Clock
     from hfg.parts.processes.rendezvous import Rendezvous
@@ -164,8 +164,8 @@ LEAVES_THE_COMMAND = """
         begin.place = Rendezvous()
         for _ in range(2):
             os.kill(os.getpid(), signal.SIGINT)
-    with Interrupt.installed() as interrupt:
-        execute(hfg.Graph(), "it", Clock.real, interrupt, begin)
+    with Interrupt.installed():
+        GraphRun(hfg.Graph(), "it", Clock.real).run(begin)
 """
 
 
