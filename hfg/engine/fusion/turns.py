@@ -126,14 +126,17 @@ class Turns(WaveState):
 
     # --- activity, and what a firing sends by itself ----------------------------------------------------------------
 
-    def receive(self, k: int, stamp: float, doing: str = "firing") -> None:
+    def receive(self, k: int, stamp: float, doing: str = "wave") -> None:
         """Member k has taken what lay on its active edges (A6)."""
         edges = self.order[k].slot_edges if k in self.schedule.called else self.order[k].live_inputs
         tokens = [edge.take() for edge in edges if edge.token is not None]
         self.receive_at(k, tokens, stamp, doing)
 
-    def receive_at(self, k: int, tokens: Sequence[Token[Any]], stamp: float, doing: str = "firing") -> None:
-        """The same for given tokens; from here on the node is amid its firing or call."""
+    def receive_at(self, k: int, tokens: Sequence[Token[Any]], stamp: float, doing: str = "wave") -> None:
+        """The same for given tokens; from here on the node is amid its firing or call.
+
+        Amid a wave, that is: whether code that was not known to send does so is still asked (`is_sending`).
+        """
         worker = self.order[k]
         worker.busy, worker.stamp = doing, stamp
         receive_modifiers(worker, [token.activity for token in tokens if token.activity])

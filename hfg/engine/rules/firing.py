@@ -167,11 +167,11 @@ def _fire_plainly(worker: RunningNode) -> None:
     All that is taken are values, one for each input, so the function is run (F4); nobody listens.
     """
     worker.begin_firing()
-    shape, inputs = worker.shape, worker.inputs
-    tokens = []
-    for edge in worker.live_inputs:
-        tokens.append(edge.take())
-        inputs.expect()
+    shape, tokens = worker.shape, []
+    for edge in worker.live_inputs:  # `edge.take` and `inputs.expect` of each, without the calls
+        tokens.append(edge.token)
+        edge.token = None
+    worker.inputs.missing += len(tokens)
     if tokens:
         stamp = tokens[0].stamp
         for token in tokens:
@@ -188,10 +188,26 @@ def _fire_plainly(worker: RunningNode) -> None:
         if token.activity:
             receive_modifiers(worker, [one.activity for one in tokens if one.activity])
             break
-    if shape.direct:
+    if not shape.direct:
+        _run_process(worker, worker.live_inputs, tokens)
+    elif worker.is_async or worker.group.threaded:
         worker.core.code.execute(worker, worker.process, [token.value for token in tokens], when_done(worker))  # type: ignore[arg-type]
     else:
-        _run_process(worker, worker.live_inputs, tokens)
+        _call_at_once(worker, [token.value for token in tokens])
+
+
+def _call_at_once(worker: RunningNode, values: list[Any]) -> None:
+    """Run a plain function on the loop: what `execute` does where nothing waits and nobody can give the firing up."""
+    core = worker.core
+    core.current = worker
+    try:
+        result = worker.process(*values)  # type: ignore[misc]  # who fires has one
+    except Exception as error:
+        core.current = None
+        when_done(worker)(None, error)
+        return
+    core.current = None
+    complete_firing(worker, result)
 
 
 def _free_places(worker: RunningNode, edges: Sequence[Any]) -> None:
