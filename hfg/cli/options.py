@@ -92,7 +92,7 @@ VerboseOption = Annotated[
 
 
 def with_run_options(verb: Callable[..., int]) -> Callable[..., int]:
-    """Give a verb the flags that options of a run declare; it receives them by name, in `**options`."""
+    """Add to a verb the flags that options of a run declare; it receives them by name, in `**options`."""
     signature = inspect.signature(verb)
     hints = get_type_hints(verb, include_extras=True)
     own = [one.replace(annotation=hints[one.name]) for one in signature.parameters.values() if one.name != "options"]

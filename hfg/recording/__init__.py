@@ -1,6 +1,8 @@
 """Recording the tokens of a run's ports to MCAP files, and playing them back.
 
-playing     nodes that send recorded tokens               `hfg play`
+playing     changes a graph so that it plays a recording  `hfg play`
+choosing    the nodes that play it
+stand_ins   the types that take their places
 players     play step by step, each at its time
 tracks      the steps of one node: firings, calls, signals
 reading     files, including damaged ones                 `hfg info`

@@ -3,21 +3,17 @@
 The tokens of one node are played by one node, firing by firing: tokens that left together leave together again, with
 their values, modifiers and stamps, including silence and the end of the stream. So a graph that a recording is played
 into repeats its behaviour. A node of the graph is replaced by one with the same ports, parameters and options. Depends
-on the engine, `players`, `tracks` and `reading`.
+on `choosing`, `stand_ins`, `tracks` and `reading`.
 """
 
 from __future__ import annotations
 
-import dataclasses
-import itertools
 import os
-import sys
-import types
 from collections import Counter
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, NamedTuple
-from weakref import WeakKeyDictionary, WeakSet
+from typing import Any, Final
+from weakref import WeakSet
 
 import msgspec
 
@@ -28,11 +24,12 @@ from hfg.graph.flat import flatten
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
 from hfg.nodetypes.node import Node, NodeType
-from hfg.ports.automatic import AUTOMATIC_EVENTS, sent_of
+from hfg.ports.automatic import sent_of
+from hfg.recording.choosing import Choice, Recorded, idle_nodes
 from hfg.recording.messages import MARKERS
-from hfg.recording.players import Player
 from hfg.recording.reading import File, RecordingInfo
-from hfg.recording.tracks import Track, recorded_ports
+from hfg.recording.stand_ins import How, stand_in
+from hfg.recording.tracks import recorded_ports
 
 __all__ = ["Playing", "play_into"]
 
@@ -40,26 +37,6 @@ _LOGGER = Log("hfg.recording")
 _BESIDE: Final = b'"beside":true'
 _PLAYBACK: Final = "hfg.nodes.recordings:Playback"
 _WITHOUT_NUMBERS: Final = "1"  # the version of recordings in which firings have no numbers
-
-
-def _ready(self: Any) -> bool:
-    ready: bool = self._player.ready()
-    return ready
-
-
-def _process(self: Any) -> None:
-    self._player.play()
-
-
-async def _process_waiting(self: Any) -> None:
-    await self._player.play_waiting()
-
-
-def _teardown(self: Any) -> None:
-    """Close the file after the run, not when the node is disabled or reset: playback continues where it was."""
-    player = self._player
-    if player.engine is None or player.engine.core.over:
-        self._recording.close()
 
 
 def _spoke(file: File) -> tuple[set[str], set[str]]:
@@ -75,71 +52,6 @@ def _spoke(file: File) -> tuple[set[str], set[str]]:
         else:
             found.add(str(file.object_in(data).get("port")))
     return found, beside
-
-
-# --- in the place of a node -------------------------------------------------------------------------------------------
-
-_numbers = itertools.count(1)
-
-
-def _stand_in(old: Node, file: str, names: dict[str, str], hints: dict[str, Any], how: _How) -> str:
-    """Make a type with the ports and parameters of a node's type that plays its recording. Return its reference.
-
-    Args:
-      old: the node.
-      file: the recording.
-      names: paths of recorded ports, and the node's port for each.
-      hints: types of these ports.
-      how: options of playback.
-    """
-    kind = old._type
-    waits = kind.is_source and kind.process_kind.startswith("async")
-    qualname = f"Played{next(_numbers)}"
-
-    def made(cls: type[Node]) -> NodeType:
-        return dataclasses.replace(
-            kind,
-            origin=cls,
-            module=__name__,
-            qualname=qualname,
-            doc=f"Plays the recording of {old.place.path}.",
-            inputs={},
-            states={},
-            process_kind="async" if waits else "function",
-            result="fields" if kind.outputs else "none",
-            fields=(),
-            is_function=False,
-            hooks=frozenset({"setup", "ready", "teardown"}),
-            caller=lambda node: node.process,
-        )
-
-    players: WeakKeyDictionary[Any, tuple[File, Player]] = WeakKeyDictionary()  # per run
-
-    def setup(self: Any) -> None:
-        engine: Any = getattr(level_of(self._place.graph).whole.run, "_engine", None)
-        if engine in players:  # it was disabled or reset, and continues where it was
-            self._recording, self._player = players[engine]
-            return
-        self._recording = File(file)
-        track = Track(self._recording, hints, may_pickle=how.pickle)
-        self._player = Player(self, track, names, how.speed)
-        if engine is not None:
-            players[engine] = self._recording, self._player
-            how.playing.tell(engine)
-
-    body = {
-        "__module__": __name__,
-        "__qualname__": qualname,
-        "setup": setup,
-        "ready": _ready,
-        "process": _process_waiting if waits else _process,
-        "teardown": _teardown,
-        # the effects of a slot are in the recording
-        "_slot_call": lambda self, name: lambda token: self._player.called(),
-    }
-    made_class: Any = types.new_class(qualname, (Node,), {"_made": made}, lambda names: names.update(body))
-    setattr(sys.modules[__name__], qualname, made_class)
-    return f"{__name__}:{qualname}"
 
 
 class Playing(msgspec.Struct):
@@ -183,12 +95,6 @@ class Playing(msgspec.Struct):
             engine.core.errors += map(UsageError, self.warnings)
 
 
-class _How(NamedTuple):
-    speed: float | None
-    pickle: bool
-    playing: Playing
-
-
 def play_into(
     graph: Graph,
     file: str | os.PathLike[str],
@@ -230,8 +136,8 @@ def play_into(
     edit = _feed(graph, path, recorded, fed, speed, playing)
     if sending or not fed:
         own = {port: channel for port, channel in recorded.items() if port not in fed}
-        how = _How(speed, pickle, playing)
-        edit += _replace(graph, path, _Recorded(own, spoke, beside, sending), how)
+        how = How(path, speed, pickle, playing.tell)
+        edit += _replace(graph, Recorded(own, spoke, beside, sending), how, playing)
     graph.edit(*edit)
     playing.gaps += _misaligned(uncounted, playing.played)
     for sentence in playing.warnings:
@@ -327,38 +233,21 @@ def _feed(
     return edit
 
 
-class _Recorded(NamedTuple):
-    """The recorded ports.
-
-    Attributes:
-      ports: channels, by path of the port.
-      spoke: ports that sent something.
-      beside:  ports that sent outside firings and slot calls.
-      mapped: ports that are played as other ports of the graph.
-    """
-
-    ports: dict[str, Any]
-    spoke: Set[str]
-    beside: Set[str]
-    mapped: dict[str, str]
-
-
-def _replace(graph: Graph, file: str, recorded: _Recorded, how: _How) -> list[commands.Command]:
+def _replace(graph: Graph, recorded: Recorded, how: How, done: Playing) -> list[commands.Command]:
     flat = flatten(graph)
-    done = how.playing
     nodes = {node.path: node for node in flat.nodes}
     of_node, done.missing = _ports_of_nodes(recorded, nodes)
     if not of_node:
         raise UsageError(
-            f'graph "{graph.name}" has none of the ports that were recorded in {file} ({_listed(recorded.ports)}): say '
-            'which stands for which, as in --map "camera.out=front.image" or ports={"camera.out": "front.image"}'
+            f'graph "{graph.name}" has none of the ports that were recorded in {how.file} ({_listed(recorded.ports)}): '
+            'say which port plays which, as in --map "camera.out=front.image" or ports={"camera.out": "front.image"}'
         )
-    choice = _Choice(of_node, nodes, flat)
+    choice = Choice(of_node, nodes, flat)
     chosen = choice.choose(recorded)
     if not chosen:
-        raise UsageError(f"the recorded ports in {file} sent nothing, so there is nothing to play")
+        raise UsageError(f"the recorded ports in {how.file} sent nothing, so there is nothing to play")
     kept = choice.kept()
-    done.rest = _idle(chosen, flat, kept)
+    done.rest = idle_nodes(chosen, flat, kept)
     edit: list[commands.Command] = []
     for path, names in of_node.items():
         ports = [port for port, name in names.items() if name]
@@ -374,7 +263,7 @@ def _replace(graph: Graph, file: str, recorded: _Recorded, how: _How) -> list[co
         if _is_away(flat, nodes[path].options.group or "loop"):  # recordings are read in this process
             edit.append(commands.Move(path, "loop"))
         hints = {port: _hint(node._type, name) for port, name in names.items()}
-        edit.append(commands.Replace(path, _stand_in(node, file, names, hints, how)))
+        edit.append(commands.Replace(path, stand_in(node, names, hints, how)))
         done.played |= {port: recorded.mapped.get(port, port) for port in ports}
         done.silent += _silent(path, node, names, flat)
     done.live = [path for path, one in nodes.items() if one.node._type.is_source and path not in (*chosen, *done.rest)]
@@ -386,7 +275,7 @@ def _is_away(flat: Any, group: str) -> bool:
     return spec is not None and spec.process
 
 
-def _ports_of_nodes(recorded: _Recorded, nodes: Mapping[str, Any]) -> tuple[dict[str, dict[str, str]], list[str]]:
+def _ports_of_nodes(recorded: Recorded, nodes: Mapping[str, Any]) -> tuple[dict[str, dict[str, str]], list[str]]:
     """Return node and port for each recorded port; "" for the event that shows that a source has fired.
 
     Returns:
@@ -437,111 +326,6 @@ def _hint(kind: NodeType, name: str) -> Any:
     """Return the type of the values of a node's port."""
     spec: Any = kind.outputs.get(name) or kind.events.get(name)
     return Any if spec is None or spec.type is None else spec.type
-
-
-class _Choice:
-    """Chooses the recorded nodes to play.
-
-    These are sources, nodes with only slots that sent signals outside firings and slot calls, and the first nodes after
-    anything unknown: sources that were not recorded, tokens from outside, ports that were left out. All other nodes
-    repeat their work.
-    """
-
-    def __init__(self, of_node: dict[str, dict[str, str]], nodes: Mapping[str, Any], flat: Any) -> None:
-        self._of_node = of_node
-        self._nodes = nodes
-        self._flat = flat
-        self._chosen: set[str] = set()
-        self._tainted: set[int] = set()  # edges with unknown tokens
-        self._leaving: dict[str, list[Any]] = {path: [] for path in nodes}
-        for edge in flat.edges:
-            if edge.source.node >= 0:
-                self._leaving[self._path(edge.source)].append(edge)
-
-    def _path(self, end: Any) -> str:
-        return str(self._flat.nodes[end.node].path) if end.node >= 0 else ""
-
-    def _kind(self, path: str) -> NodeType:
-        kind: NodeType = self._nodes[path].node._type
-        return kind
-
-    def choose(self, recorded: _Recorded) -> list[str]:
-        """Return the paths of the chosen nodes, in the order of the recording."""
-        mapped = {target.rpartition(".")[0] for target in recorded.mapped.values()}
-        for path, names in self._of_node.items():
-            kind = self._kind(path)
-            speaks = kind.process_kind == "none" and recorded.beside & set(names)
-            if kind.is_source or speaks or path in mapped:
-                self._chosen.add(path)
-        unknown = self._unknown_from_the_beginning()
-        while unknown:
-            edge = unknown.pop()
-            if edge.index not in self._tainted:
-                self._tainted.add(edge.index)
-                unknown += self._unknown_behind(self._path(edge.target), recorded.spoke)
-        return [path for path in self._of_node if path in self._chosen]
-
-    def _unknown_from_the_beginning(self) -> list[Any]:
-        outside = [edge for edge in self._flat.edges if edge.source.node < 0]
-        unknown = [edge for edge in outside if edge.source.kind != "event"]  # `start` is known
-        for path, leaving in self._leaving.items():
-            if path in self._chosen:
-                unknown += self._unplayed(path)
-            elif path not in self._of_node and self._kind(path).is_source:
-                unknown += leaving
-        return unknown
-
-    def _unknown_behind(self, path: str, spoke: Set[str]) -> list[Any]:
-        """Return the edges whose tokens are unknown because of unknown input to a node."""
-        if not path or path in self._chosen:
-            return []
-        if not spoke & set(self._of_node.get(path, ())):
-            return self._leaving[path]
-        self._chosen.add(path)
-        return self._unplayed(path)
-
-    def _unplayed(self, path: str) -> list[Any]:
-        return [edge for edge in self._leaving[path] if not _is_played(edge.source, self._of_node[path])]
-
-    def kept(self) -> set[str]:
-        """Return the paths of parameters of played sources whose edges stay because their values repeat."""
-        return {
-            edge.target.port.path
-            for edge in self._flat.edges
-            if edge.target.kind == "parameter" and edge.index not in self._tainted and self._is_source(edge.target)
-        }
-
-    def _is_source(self, end: Any) -> bool:
-        path = self._path(end)
-        return path in self._chosen and self._kind(path).is_source
-
-
-def _is_played(source: Any, names: Mapping[str, str]) -> bool:
-    """Return whether tokens from this output are played: recorded, or sent automatically."""
-    name = sent_of(source.name) or source.name
-    return name in names.values() or source.kind == "parameter" or name in AUTOMATIC_EVENTS
-
-
-def _idle(chosen: list[str], flat: Any, kept: Set[str]) -> list[str]:
-    """Return the nodes without any remaining consumer: all their tokens went into firings of played nodes."""
-    leads: dict[str, list[Any]] = {node.path: [] for node in flat.nodes if node.path not in chosen}
-    for edge in flat.edges:
-        if edge.source.node >= 0 and flat.nodes[edge.source.node].path in leads:
-            leads[flat.nodes[edge.source.node].path].append(edge.target)
-    idle: list[str] = []
-    changed = True
-    while changed:
-        changed = False
-        for path, targets in leads.items():
-            if path not in idle and targets and all(_takes_nothing(end, flat, chosen, idle, kept) for end in targets):
-                idle.append(path)
-                changed = True
-    return idle
-
-
-def _takes_nothing(end: Any, flat: Any, chosen: list[str], idle: list[str], kept: Set[str]) -> bool:
-    path = flat.nodes[end.node].path if end.node >= 0 else ""
-    return path in idle or (path in chosen and end.kind in ("input", "parameter") and end.port.path not in kept)
 
 
 def _edges_into(node: Node) -> list[Any]:

@@ -145,7 +145,7 @@ class Replay:
         self._paused = False  # time may go on although nodes are enabled (R3)
         self.expected: list[TraceEvent] = []
         self._delays: set[str] = set()
-        self._unheard: Counter[tuple[Any, ...]] = Counter()  # what only the reference has triggered yet for nobody
+        self._unheard: Counter[tuple[Any, ...]] = Counter()  # without edges; so far only of the reference
         self._torn_down: dict[str, TraceEvent] = {}  # nodes whose do-activity has ended for an edit that is to come
         self._look_at_edges()
         self._expect(self.machine.start())
@@ -154,7 +154,7 @@ class Replay:
         lines = self.machine.lines
         events = [line.edge.source for line in lines if line.edge.source.kind == "event"]
         self._connected = {self.machine.event_path(source.owner, source.name) for source in events}
-        self._delays |= {line.edge.label for line in lines if line.slack}  # what is said of one that was removed, too
+        self._delays |= {line.edge.label for line in lines if line.slack}  # including removed ones
 
     def see(self, event: TraceEvent) -> None:
         """Take the next event of the run.
@@ -174,7 +174,7 @@ class Replay:
             self._let_time_go(event)
         elif event.time > self.machine.now and not self.expected:
             # Neighbours in the grid of nanoseconds are one moment (R6), and the stamps are of the clock of the run: it
-            # may have gone on by the last digit to what the reference would permit already.
+            # may be ahead by the last digit to what the reference would permit already.
             self._apply(Move("wait", time=event.time))
         if isinstance(event, EditWaits):
             self.machine.hold(event.nodes)
@@ -266,7 +266,7 @@ class Replay:
         """Return whether the event is invisible: events without edges, and events that are not compared."""
         if isinstance(event, EventTriggered):
             return event.event not in self._connected
-        if isinstance(event, TokenProcessed):  # a delay or buffer: nobody waits, so nobody is told when
+        if isinstance(event, TokenProcessed):  # of a delay or buffer: no node waits, so the moment is open
             return event.edge in self._delays
         return isinstance(event, RunPaused | RunResumed)
 
@@ -320,7 +320,7 @@ class Replay:
                 self._apply(move)
 
     def _end_tasks(self, node: str) -> None:
-        """Nobody sees tasks end that were cancelled, or a reset, but that their node begins something."""
+        """End cancelled tasks: the trace shows their end, as by a reset, only when their node starts something."""
         for move in self.machine.moves():
             task = self.machine.task_of(move) if move.kind == "task" else None
             cancelled = task is not None and task.cancelled and self._ends_unseen(task)
@@ -445,7 +445,7 @@ class Replay:
         if isinstance(event, TokenSent | TokenDropped):
             line = self.machine.labels.get(event.edge)
             return None if line is None else self.machine.path_of(line.edge.source.owner)
-        if isinstance(event, TokenProcessed | TokenDrained):  # the first thing to be seen of who ends (F4, F12)
+        if isinstance(event, TokenProcessed | TokenDrained):  # the first event that shows that a node ends (F4, F12)
             line = self.machine.labels.get(event.edge)
             return None if line is None else self.machine.path_of(line.edge.target.owner)
         return getattr(event, "node", None)
@@ -481,10 +481,10 @@ class Replay:
             if isinstance(event, EditWaits | StructureChanged) and all(
                 move.kind == "wait" for move in self.machine.owed_moves()
             ):
-                # somebody outside has waited so long (R4)
+                # code outside has waited until then (R4)
                 steps = [*(move for move in moves if move.kind == "wait"), Move("wait", time=event.time)]
             hangs = isinstance(event, RunEnded) and event.time >= self.machine.now + TEARDOWN_LIMIT_S - _SAME_TIME
-            # Where a teardown took its time the run was over before, though a source for nobody could have gone on.
+            # The run was over before a teardown that took its time, even if a source without consumers had continued.
             wait = min(steps, key=lambda move: ((move.kind == "finish") is not hangs, move.time), default=None)
             if wait is None:
                 raise Divergence("time went on although the rules permit moves now", event, self)

@@ -143,7 +143,7 @@ def _letters(step: Step, letters: list[tuple[Any, str]]) -> str:
 
 
 class _Driver(hfg.Node):
-    """Gives what a diagram says, when it says so; waits forever after a line without an end."""
+    """Sends the tokens of a diagram at their ticks; waits forever after a line without an end."""
 
     out = hfg.Output(Any)
     signal = hfg.Event(Any)
@@ -232,7 +232,7 @@ def _drive(graph: Graph, node: Node, name: str, steps: tuple[Step, ...], tick_s:
         graph.connect(driver.ports.events["signal"], node.ports.slots[name], active=active)
     else:
         known = ", ".join([*node.ports.inputs, *node.ports.slots])
-        raise ValueError(f'"{name}" is no input and no slot; there are {known or "none"}')
+        raise ValueError(f'"{name}" is not an input or a slot; there are {known or "none"}')
 
 
 def _seen(node: Node, seen: Recorder, tick_s: float) -> dict[str, list[Step]]:

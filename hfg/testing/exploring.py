@@ -158,7 +158,7 @@ def _built(build: object) -> Graph:
         graph.close()
         raise UsageError(f"{again}; this one is async: let a plain function build it")
     if not isinstance(graph, Graph):
-        raise UsageError(f"{again}; this one gave back {graph!r:.80}: return the graph")
+        raise UsageError(f"{again}; this one returned {graph!r:.80}: return the graph")
     return graph
 
 

@@ -178,7 +178,7 @@ def _need_one(node: Node, slot: str | None, hook: str | None, values: dict[str, 
         return
     if hook not in HOOKS:
         instead = ": leave hook= out for a firing" if hook == "process" else f"; {suggest(str(hook), HOOKS)}"
-        raise UsageError(f'"{hook}" is no hook of a node{instead}')
+        raise UsageError(f'"{hook}" is not a hook of a node{instead}')
     if values:
         raise UsageError(f'hook "{hook}" takes no values, got {_names(values)}: leave them out')
     if hook not in node._type.hooks and hook != "teardown":
@@ -279,7 +279,7 @@ class _Firing:
                 due = self.loop.next_time()
                 if due is None:
                     task.get_coro().close()
-                    raise UsageError(f'"{self.type.name}" waits for something that never comes when it is alone')
+                    raise UsageError(f'"{self.type.name}" waits for something that never comes outside a graph')
                 self.now = due
                 self.loop.ring()
             return task.result()

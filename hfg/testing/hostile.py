@@ -85,7 +85,7 @@ class _Guarded:
         for place in (address, address + page + self.SIZE):
             if library.mprotect(ctypes.c_void_p(place), ctypes.c_size_t(page), 0) != 0:
                 raise OSError(ctypes.get_errno(), "mprotect")
-        # as memory that another library has mapped, of which nobody knows where it ends
+        # like memory that another library has mapped, whose end is unknown
         self._memory = np.frombuffer(memoryview((ctypes.c_ubyte * self.SIZE).from_address(address + page)), np.uint8)
 
     def hold(self, array: Any, *, at_end: bool, room: bool) -> Any:

@@ -213,7 +213,7 @@ def ended_nodes_rest(events: list[TraceEvent]) -> list[str]:
     """A node that has ended fires no more, unless it is set up again (F12)."""
     ended: set[str] = set()
     busy: set[str] = set()
-    afresh: set[str] = set()  # as soon as what they are amid is over, for a subgraph around them was meant
+    afresh: set[str] = set()  # after their current code, because a subgraph around them is reset
     found = []
     for event in events:
         if isinstance(event, NodeEnded) and event.node not in afresh:
@@ -298,7 +298,7 @@ def _asked(invariant: Invariant, events: list[TraceEvent]) -> list[str]:
         found.close()
         raise UsageError(f'invariant "{_title(invariant)}" is async: let a plain function look at the trace')
     raise UsageError(
-        f'invariant "{_title(invariant)}" gave back {found!r:.80}: let it give a list of sentences about what is '
+        f'invariant "{_title(invariant)}" returned {found!r:.80}: let it return a list of problems about what is '
         "wrong, empty if nothing is, or assert what holds"
     )
 

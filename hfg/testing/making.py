@@ -329,7 +329,7 @@ class Making:
             self.make_first_activity(slots)
 
     def make_first_activity(self, slots: list[tuple[NodePlan, str]]) -> None:
-        """Give the activity of the start to a slot."""
+        """Let the activity of the start go to a slot."""
         if slots and self.choose.chance(60):
             begins = [(node.name, "slot", port) for node, port in slots if port in self.any_slots]
             begins += [(node.name, "slot", "activate") for node in self._callable(self.nodes)]

@@ -191,7 +191,7 @@ class TransportTests:
             await self.reach(publisher, inbox)
             for number in range(2000):
                 publisher.put(b"number", number.to_bytes(4, "big"))
-                if number % 100 == 99:  # what nobody takes out in time may be dropped, on the kindest network
+                if number % 100 == 99:  # datagrams that are not taken in time may be dropped, even on a perfect network
                     await self.reach(publisher, inbox, header=b"%d" % number)
             arrived = [payload for header, payload in map(_plain, inbox.items) if header == b"number"]
             numbers = [int.from_bytes(payload, "big") for payload in arrived]
@@ -632,7 +632,7 @@ class TransportTests:
                 return await session.ask(name, question, timeout_s=self.patience_s)
             except NoAnswer:
                 await asyncio.sleep(self.patience_s / 1000)
-        raise AssertionError(f'nobody answers to "{name}"')
+        raise AssertionError(f'there is no answer to "{name}"')
 
     async def _in_time(self, what: Any) -> Any:
         async with asyncio.timeout(6 * self.patience_s):

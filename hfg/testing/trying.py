@@ -208,7 +208,7 @@ class _Trying:
             self._alone(parameters, values)
             return False
         except Exception as error:
-            with suppress(Exception):  # what it has opened is closed; what was wrong is told below
+            with suppress(Exception):  # it closes what it has opened; the error is reported below
                 fire(node, hook="teardown")
             self._judge(error, parameters, values, said)
             return False

@@ -71,7 +71,7 @@ class Alike:
 _ALIKE: Final = st.sampled_from(
     [
         Alike(rows, columns, 12, channels, dtype)
-        for rows, columns in ((24, 32), (12, 12))  # also square, for what belongs together by products
+        for rows, columns in ((24, 32), (12, 12))  # also square, so that products of matrices fit
         for channels in (1, 3)
         for dtype in (np.uint8, np.float32)
     ]
@@ -275,7 +275,7 @@ def _floats(limits: tuple[Any, ...]) -> st.SearchStrategy[float]:
             )
         ).map(lambda number: number * step)
     if least is None and most is None:
-        # What is no number comes too, but not so often that nothing else is seen.
+        # NaN occurs, too, but rarely enough to see the effects of other values.
         return st.one_of(st.floats(-10, 10), st.floats(-_MANY, _MANY), st.integers(-10, 10).map(float), st.floats())
     low = float(least if least is not None else most - _MANY)
     high = float(most if most is not None else least + _MANY)

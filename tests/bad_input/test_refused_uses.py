@@ -334,11 +334,11 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "fire a slot without a value": (lambda: fire(Count(), slot="start_at"), 'takes a value: fire(node, slot="start_at'),
     "fire a slot's wrong type": (lambda: fire(Count(), slot="start_at", value="a"), 'slot "count.start_at" is declare'),
     "fire a slot by name": (lambda: fire(Count(), slot="start_at", at=1), 'a slot takes value=..., got "at"'),
-    "fire no hook": (lambda: fire(Count(), hook="stup"), '"stup" is no hook of a node; did you mean "setup"?'),
+    "fire no hook": (lambda: fire(Count(), hook="stup"), '"stup" is not a hook of a node; did you mean "setup"?'),
     "fire process as a hook": (lambda: fire(Count(), hook="process"), "no hook of a node: leave hook= out for a firin"),
     "fire a hook it has not": (lambda: fire(Count(), hook="end"), 'count does not define "end", so there is nothing t'),
     "fire a hook with values": (lambda: fire(FailsEnd(), hook="end", value=1), 'hook "end" takes no values, got "valu'),
-    "fire a hook that is none": (lambda: fire(Count(), hook=print), "is no hook of a node"),  # type: ignore[arg-type]
+    "fire a hook that is none": (lambda: fire(Count(), hook=print), "is not a hook of a node"),  # type: ignore[arg-type]
     "fire two things": (lambda: fire(Count(), hook="end", slot="start_at"), "one at a time: write two calls"),
     "fire no parameter": (lambda: fire(Count(), parameters={"limt": 3}, value=1), 'no parameter "limt"; its parameter'),
     "fire a list of parameters": (lambda: fire(Count(), parameters=[3], value=1), "values b"),  # type: ignore[arg-type]
@@ -359,13 +359,13 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "explore one invariant": (lambda: explore(build, invariants=claims), "a list of functio"),  # type: ignore[arg-type]
     "explore names": (lambda: explore(build, invariants=["lost"]), "a function that takes"),  # type: ignore[list-item]
     "an invariant that is a class": (invariant(Count), "an invariant is a function that takes a trace, got"),
-    "an invariant that is true": (invariant(says_true), '"says true" gave back True: let it give a list of sentences'),
-    "an invariant with numbers": (invariant(says_one), '"says one" gave back 1: let it give a list of sentences'),
+    "an invariant that is true": (invariant(says_true), '"says true" returned True: let it return a list of problems'),
+    "an invariant with numbers": (invariant(says_one), '"says one" returned 1: let it return a list of problems'),
     "an invariant that is async": (invariant(says_later), '"says later" is async: let a plain function look at the'),
     "a diagram of a type": (lambda: diagrams.run(inc, value="1"), "a diagram drives a node,"),  # type: ignore[arg-type]
     "a diagram of nothing": (lambda: diagrams.run(3, value="1"), "a diagram drives a node,"),  # type: ignore[arg-type]
     "a diagram that is a number": (lambda: diagrams.run(inc(), value=1), "a diagram is a te"),  # type: ignore[arg-type]
-    "a diagram for no port": (lambda: diagrams.run(inc(), valve="1"), '"valve" is no input and no slot; there are val'),
+    "a diagram for no port": (lambda: diagrams.run(inc(), valve="1"), '"valve" is not an input or a slot; there'),
     "a diagram's letter": (lambda: diagrams.run(inc(), value="1?"), '"?" at 1 of the diagram "1?" means nothing'),
     "the oracle chooses": (lambda: reference_run(build(), choose=3), "choose= is a function"),  # type: ignore[arg-type]
     # --- run ---

@@ -98,7 +98,7 @@ def test_a_difference_shows_both_lines() -> None:
 
 
 def test_a_name_that_is_no_port_is_refused() -> None:
-    with pytest.raises(ValueError, match='"valve" is no input and no slot; there are value'):
+    with pytest.raises(ValueError, match='"valve" is not an input or a slot; there are value'):
         run(double(), valve="1")
 
 

@@ -119,7 +119,7 @@ def test_code_that_waits_for_others_is_told_so() -> None:
         async def process(self, value: int) -> None:
             await asyncio.get_running_loop().create_future()
 
-    with pytest.raises(hfg.errors.UsageError, match="never comes when it is alone"):
+    with pytest.raises(hfg.errors.UsageError, match="never comes outside a graph"):
         fire(Lonely(), value=1)
 
 

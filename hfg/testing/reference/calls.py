@@ -49,7 +49,7 @@ class Calling(Tending):
         station.flights.append(flight)
         self.receive_activity(owner, [lying.token.activity])
         self.note_places()  # a queue may have room again
-        if name in station.type.slots:  # else behind what the automatic slot does (A7)
+        if name in station.type.slots:  # otherwise after the automatic slot (A7)
             self.settle()
         self.launch_call(flight, self.handler_of(station, name, lying.token))
         self.settle()
@@ -298,7 +298,7 @@ class Calling(Tending):
         else:
             changed = self.box_enabled[-2 - owner] != enabled
             self.box_enabled[-2 - owner] = enabled
-        if self.is_enabled(owner) != before:  # inside a disabled subgraph nobody can tell yet
+        if self.is_enabled(owner) != before:  # inside a disabled subgraph this is not visible yet
             self.observe(NodeEnabled(self.now, self.path_of(owner), enabled))
         return changed
 
@@ -307,7 +307,7 @@ class Calling(Tending):
         self.cancel_tasks(station)
         for flight in station.firings_under_way:
             flight.void = True
-        for line in self.lines:  # nobody waits for what it has taken
+        for line in self.lines:  # no node waits for tokens that it has taken
             if line.edge.target.owner == index and line.edge.target.name != "enable" and line.unprocessed:
                 self.process(line)
         self._empty(lambda line: line.edge.target.owner == index and line.edge.target.name != "enable")

@@ -101,7 +101,7 @@ class Editing(Calling):
         self._exchange_boxes(after, boxes)
         for station in self._gated().values():
             if id(station) not in gated:
-                station.last_function = float("-inf")  # from the first firing behind the gate
+                station.last_function = float("-inf")  # from the first firing after the gate is set
         number_of = {self._name_of(owner): owner for owner in self._owners()}
         for lying, name in senders:
             lying.sender = number_of.get(name, _GONE)

@@ -364,7 +364,7 @@ class Firing(RunningCode):
         """No code of it may go on any more: what has waited for that is done (F14, G2, X1)."""
         if not station.afterwards or station.is_amid:
             return
-        if station.tasks:  # which come to their end first, and call again behind the last
+        if station.tasks:  # which end first; the last of them calls this again
             self.cancel_tasks(station)
             return
         wanted, station.afterwards = station.afterwards, ""

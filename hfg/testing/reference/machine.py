@@ -103,7 +103,7 @@ class ReferenceMachine(Rings):
         self.paths |= {box.path: -2 - box.index for box in self.structure.boxes}
         self.paths[""] = ROOT
         self.feeding: dict[str, list[Any]] = {}  # what is to be fed into each input of the graph
-        self.unread: set[str] = set()  # outputs of the graph that nobody reads at the moment
+        self.unread: set[str] = set()  # outputs of the graph without a reader at the moment
         self.collected: dict[str, list[Any]] = {}
         self.labels = {line.edge.label: line for line in self.lines}
 

@@ -180,7 +180,7 @@ class Rings(Editing):
 
     def _need_of_signal(self, owner: int) -> _Need:
         if owner == ROOT:
-            return _Need("any")  # `start` has been triggered, and what comes from outside nobody waits for
+            return _Need("any")  # `start` was triggered, and no node waits for tokens from outside
         if is_box(owner):
             box = self.structure.boxes[-2 - owner]
             inner = {-2 - one.index for one in self.structure.boxes if box.index in one.boxes}

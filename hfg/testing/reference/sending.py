@@ -107,7 +107,7 @@ class Sending(State):
         line.sequence += 1
         token = _with(token, sequence=line.sequence)
         policy = line.edge.overflow
-        if line.given_end and token.value is not END:  # nobody waits for what comes behind END (F13)
+        if line.given_end and token.value is not END:  # tokens after END are dropped (F13)
             self.observe(TokenSent(self.now, line.edge.label, token))
             self.observe(TokenDropped(self.now, line.edge.label, token, "ended"))
             if token.activity == 1:
@@ -121,7 +121,7 @@ class Sending(State):
         if full and policy in ("drop_oldest", "latest"):
             self.observe(TokenDropped(self.now, line.edge.label, line.queue.pop(0).token, "overflow"))
         self.observe(TokenSent(self.now, line.edge.label, token))
-        if full and policy in ("drop_newest", "error"):  # "error": only what operators give out, for nobody triggers it
+        if full and policy in ("drop_newest", "error"):  # "error": only of operators, whose output has no caller
             self.observe(TokenDropped(self.now, line.edge.label, token, "overflow"))
             return
         line.queue.append(Lying(token, self.next_tick(), sender, self.now))
@@ -145,7 +145,7 @@ class Sending(State):
           QueueOverflow: an edge with policy "error" is full; nothing was sent.
         """
         if self.outcome is not None:
-            return  # code that is ended with the run speaks to nobody any more
+            return  # code that ends with the run cannot send any more
         value, activity, stamp = passed_on(value, activity, stamp)
         if stamp is None:
             stamp = self.now if flight is None else flight.stamp
@@ -238,7 +238,7 @@ class Sending(State):
             self.lose_activity(line.edge.label)
 
     def lose_activity(self, where: str) -> None:
-        """Nobody can have it: that is counted (A8)."""
+        """Count an activity that no node can receive (A8)."""
         self.lost_activity += 1
         self.observe(ActivityLost(self.now, where))
 
@@ -303,7 +303,7 @@ class Sending(State):
 
     def process(self, line: Line) -> None:
         """Count one taken token as processed."""
-        if not line.delay and line.unprocessed:  # else nobody waits any more, for the node was disabled meanwhile
+        if not line.delay and line.unprocessed:  # otherwise the node was disabled meanwhile
             line.unprocessed -= 1
             self.note_processed(line)
 
@@ -311,10 +311,10 @@ class Sending(State):
         """Outputs of a firing that is over leave in its turn, as soon as those before have been processed (F14)."""
         for station in self.stations:
             if any(flight.leaving for flight in station.flights):
-                continue  # behind it
+                continue  # after it
             firings = station.firings_under_way
             over = sorted((one for one in firings if one.over is not None), key=lambda one: one.over_since)
-            void = [one for one in over if one.void]  # goes nowhere, so it waits for nobody (F10)
+            void = [one for one in over if one.void]  # sends nothing, so it need not wait (F10)
             if not void and station.leaf.options.ordered and over and over[0] is not firings[0]:
                 over = [one for one in firings[:1] if one.over is not None]
             if over and self.may_leave(one := (void or over)[0]):
@@ -339,7 +339,7 @@ class Sending(State):
             if station.ending and not station.ended and not busy and self.outputs_are_free(index):
                 lines = self.in_order_of_outputs(station)
                 self.put_together(index, [(line, END, None, station.stamp) for line in lines])
-                while self.drain_once():  # the own END too, if it comes round
+                while self.drain_once():  # including its own END in a cycle
                     pass
                 station.ended = True
                 self.observe(NodeEnded(self.now, station.path))
@@ -348,7 +348,7 @@ class Sending(State):
                 for modifier in waiting:
                     self.receive_activity(index, [modifier])
                 if not station.flights:
-                    self.flush_changes(station)  # what its end has changed is told before its events complete (F12)
+                    self.flush_changes(station)  # report the changes of its end before its events complete (F12)
                     self.note_places()
                 self.complete_operators(station)
                 return True

@@ -101,12 +101,12 @@ class Flight:
     over_since: int = 0
     leaving: bool = False
     waits_to_end: bool = False  # it ends the node as soon as the firings that began before it are over (F14)
-    when_rested: Callable[[], None] | None = None  # what a call does as soon as no code of a firing goes on (F14)
+    when_rested: Callable[[], None] | None = None  # called as soon as no code of a firing runs (F14)
     parameters: dict[str, Any] = field(default_factory=dict)  # as they were when it began
     attempts: int = 0  # at running its function (X1)
     triggered: bool = False  # an attempt has sent a signal, so there is no other
     again: Callable[[], None] | None = None  # makes the next attempt
-    pause_until: float | None = None  # the pause before that
+    pause_until: float | None = None  # the pause before the next attempt
 
 
 @dataclass(eq=False)
@@ -135,7 +135,7 @@ class Station:
     ending: bool = False  # `end()` has been called; END is due
     ended: bool = False
     given_up: bool = False  # by R5: counts as ended, though it has sent no END
-    flights: list[Flight] = field(default_factory=list)  # what is under way, in the order in which it began
+    flights: list[Flight] = field(default_factory=list)  # firings in progress, in the order of their start
     place: int | None = None  # since when it is enabled for a firing (F9)
     timed: float | None = None  # when, if a timer made it so
     rested: bool = False  # it worked for ended nodes only and may have given its place away
@@ -160,7 +160,7 @@ class Station:
     set_up: bool = False
     opening: bool = False  # its `setup()` runs
     early: list[tuple[str, Any, int | None, float]] | None = None  # what it sends before it takes part (R4)
-    tasks: list[Task] = field(default_factory=list)  # under way beside its firings
+    tasks: list[Task] = field(default_factory=list)  # in progress, next to its firings
     tasks_begun: int = 0
     is_to_do: bool = False  # its do-activity has yet to begin (A15)
     stops_itself: bool = False  # `ready` raised EndOfStream
@@ -241,7 +241,7 @@ class State:
         self.graph = graph
         self.now = 0.0
         self.tick = 0
-        self.calling_boxes: set[int] = set()  # whose slot call is under way, for something inside is in a thread
+        self.calling_boxes: set[int] = set()  # with a slot call in progress because a node inside is in a thread
         self.stations = [Station(leaf, fresh(leaf)) for leaf in self.structure.leaves]
         self.lines = [Line(edge, edge.capacity) for edge in self.structure.edges]
         self.box_enabled = [bool(box.options.enabled) for box in self.structure.boxes]
@@ -252,7 +252,7 @@ class State:
         self.held_open = False
         self.readers: set[str] = set()
         self.outcome: str | None = None
-        self.in_timers = False  # whether what happens now happens because time went on
+        self.in_timers = False  # whether timers cause the current step
         self.started = False  # whether the signals of `start` are on their edges (A10)
         self.error: BaseException | None = None
         self.observed: list[TraceEvent] = []
@@ -333,7 +333,7 @@ class State:
             return True
         if is_box(owner):
             return self._box_open(-2 - owner)
-        if owner < 0:  # the border of what iterates: a firing under way is finished (F10)
+        if owner < 0:  # the border of what iterates: a firing in progress is finished (F10)
             return True
         station = self.stations[owner]
         return station.enabled and station.afterwards != "enable" and self.is_enabled_around(owner)

@@ -72,7 +72,7 @@ class Tending(Firing):
             self.end_task(task)
 
     def end_task(self, task: Task) -> None:
-        """It is over; behind the last one those have their turn who wait for that."""
+        """Remove a task that is over; after the last one, code that waits for the tasks continues."""
         station = task.station
         station.tasks.remove(task)
         self.loop.forget(task)
