@@ -43,6 +43,13 @@ def _distribute(
     return distribute(graph, flat, options, virtual=virtual, settings=settings)
 
 
+def _visit_studio(door: Any, transport: Any) -> Any:
+    """Implement `hooks.visit_studio`; its dependencies are imported only if another program steers the run."""
+    from hfg.studio.local import visit
+
+    return visit(door, transport)
+
+
 def _refusal(
     references: Iterable[str], values: Iterable[str], types: Iterable[str], allow: Iterable[str]
 ) -> str | None:
@@ -75,5 +82,6 @@ def _refusal(
 
 hooks.refusal = _refusal
 hooks.distribute = _distribute
+hooks.visit_studio = _visit_studio
 hooks.record = _record
 hooks.report_page = _report_page

@@ -58,6 +58,7 @@ FIRST_FLOOR_THAT_WAITS = 5
 SAME_FLOOR_FREE = {0, 2}  # one vocabulary each: what everybody speaks of, and what a node type is
 SAME_FLOOR_PAIRS = {
     ("hfg.cli", "hfg.studio"),
+    ("hfg.composing", "hfg.studio"),
     ("hfg.engine", "hfg.links.running"),
     ("hfg.links.pubsub", "hfg.links.running"),
     ("hfg.parts.transports", "hfg.links.local"),  # the one that is always there

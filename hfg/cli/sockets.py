@@ -74,6 +74,34 @@ class Line:
             raise TargetError(f"process {self._pid}: {answer.error}")
         return answer
 
+    def send(self, data: bytes) -> None:
+        """Send bytes as they are.
+
+        Raises:
+          TargetError: the run is over.
+        """
+        try:
+            self._socket.sendall(data)
+        except OSError:
+            raise TargetError(f"the run in process {self._pid} is over") from None
+
+    def receive(self) -> bytes | None:
+        """Return the next bytes as they come; None if none come for two seconds.
+
+        Raises:
+          TargetError: the run is over.
+        """
+        heard, self._heard = self._heard, b""
+        try:
+            heard = heard or self._socket.recv(1 << 20)
+        except TimeoutError:
+            return None
+        except OSError:
+            heard = b""
+        if not heard:
+            raise TargetError(f"the run in process {self._pid} is over")
+        return heard
+
     def lines(self) -> Iterator[str]:
         """Yield the lines of a tap, until the run is over or the run closes the tap."""
         self._socket.settimeout(None)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import threading
 import webbrowser
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,6 +15,7 @@ from hfg.cli import show
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.options import AllowOption, ArgOption, DebugOption, ParamOption
 from hfg.cli.settings import set_parameters
+from hfg.cli.sockets import find, which
 from hfg.cli.target import load_graph
 from hfg.engine import PunctualLoop
 from hfg.errors import TargetError
@@ -30,6 +32,9 @@ def studio(
     ] = None,
     host: Annotated[str, typer.Option(help="Address to listen at; other than this machine needs TLS.")] = "127.0.0.1",
     port: Annotated[int | None, typer.Option(help="Port; default: the first free one from 8800.")] = None,
+    attach: Annotated[
+        str | None, typer.Option(metavar="RUN", help="Follow and steer a run of hfg run: its process id or graph.")
+    ] = None,
     run: Annotated[bool, typer.Option("--run", help="Start the graph at once.")] = False,
     read_only: Annotated[bool, typer.Option("--read-only", help="Pages may look, not change.")] = False,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
@@ -51,6 +56,19 @@ def studio(
     from hfg.studio.project import Project
     from hfg.studio.studio import Studio
 
+    options = {
+        "host": host,
+        "port": port,
+        "certfile": None if certfile is None else str(certfile),
+        "keyfile": None if keyfile is None else str(keyfile),
+        "insecure": insecure,
+    }
+    if attach is not None:
+        return _attach(attach, target, options, browser, read_only=read_only)
+    if target is not None and target.endswith(".mcap"):
+        raise TargetError(
+            f"recordings cannot be opened in the studio yet: hfg play {target} plays one, hfg info shows it"
+        )
     graph = Graph("graph") if target is None else load_graph(target, arg or [], allow)
     set_parameters(graph, param or [])
     file = _file_of(target)
@@ -60,19 +78,10 @@ def studio(
 
     async def main() -> None:
         made = Studio(project, read_only=why, target=target or graph.name)
-        server = Server(
-            StudioDoor(asyncio.get_running_loop(), made),
-            host=host,
-            port=port,
-            certfile=None if certfile is None else str(certfile),
-            keyfile=None if keyfile is None else str(keyfile),
-            insecure=insecure,
-        )
+        server = Server(StudioDoor(asyncio.get_running_loop(), made), **options)
         server.start()
         threading.Thread(target=warm_up, name="hfg studio palette", daemon=True).start()
-        show.write(f"{server.address}\n")
-        if browser:
-            webbrowser.open(server.address)
+        _show(server.address, browser)
         try:
             if run:
                 await made.steering.start(stay=False)
@@ -84,7 +93,37 @@ def studio(
     return _until_interrupted(main)
 
 
-def _until_interrupted(main: object) -> int:
+def _show(address: str, browser: bool) -> None:
+    show.write(f"{address}\n")
+    if browser:
+        webbrowser.open(address)
+
+
+def _attach(name: str, target: str | None, options: Mapping[str, Any], browser: bool, *, read_only: bool) -> int:
+    """Serve pages of a run in another process."""
+    from hfg.studio.attaching import AttachedDoor
+    from hfg.studio.serving import Server
+
+    if target is not None or read_only:
+        what = "--read-only" if read_only else f'"{target}"'
+        raise TargetError(f"--attach follows a run as it is, so {what} means nothing to it; leave it out")
+    there = find(name)
+    if len(there) > 1:
+        return which("studio --attach", there)
+
+    async def main() -> None:
+        server = Server(AttachedDoor(there[0].name), **options)
+        server.start()
+        _show(server.address, browser)
+        try:
+            await asyncio.Event().wait()
+        finally:
+            await server.stop()
+
+    return _until_interrupted(main)
+
+
+def _until_interrupted(main: Callable[[], Awaitable[None]]) -> int:
     interrupt = Interrupt.current or Interrupt()
     interrupt.what = "the studio"
 
@@ -92,7 +131,7 @@ def _until_interrupted(main: object) -> int:
         task = asyncio.current_task()
         assert task is not None
         with interrupt.cancels(task):
-            await main()  # type: ignore[operator]
+            await main()
 
     try:
         with asyncio.Runner(loop_factory=PunctualLoop) as runner:

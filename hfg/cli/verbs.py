@@ -26,6 +26,7 @@ _MODULES: Final[Mapping[str, str]] = {
     **{name: name for name in ("top", "agent")},
     **dict.fromkeys(("deploy", "ps", "logs", "restart", "stop"), "runs"),
     **{name: name for name in ("new", "keys", "studio")},
+    **dict.fromkeys(("set", "edit", "undo", "redo", "reload", "pause", "resume", "step", "trigger"), "steer"),
 }
 
 

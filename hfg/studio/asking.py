@@ -10,7 +10,7 @@ from typing import Any, Final
 import msgspec
 
 from hfg.graph.structure.level import inside, level_of
-from hfg.graph.structure.pointing import node_at
+from hfg.graph.structure.pointing import node_at, parameter_at
 from hfg.studio.clipboard import pasted, text_of_nodes
 from hfg.studio.following import Following
 from hfg.studio.palette import search_types, type_of_reference
@@ -69,6 +69,11 @@ class _Type(_Args, frozen=True):
     reference: str
 
 
+class _Said(_Args, frozen=True):
+    path: str
+    text: str
+
+
 class _Paths(_Args, frozen=True):
     paths: list[str]
 
@@ -109,6 +114,11 @@ async def _value(host: Following, args: _Path) -> Any:
 
 
 _PATIENCE_S: Final = 2.0
+
+
+async def _read_text(host: Following, args: _Said) -> Any:
+    port = parameter_at(level_of(host.graph), args.path)
+    return {"value": port.spec.encode(port.spec.read_text(args.text))}
 
 
 async def _node(host: Following, args: _Path) -> Any:
@@ -152,6 +162,7 @@ _ANSWERS: Final[Mapping[str, tuple[type[_Args], Callable[[Following, Any], Await
     "type": (_Type, _type),
     "value": (_Path, _value),
     "node": (_Path, _node),
+    "read_text": (_Said, _read_text),
     "folder": (_Path, _folder),
     "start": (_Nothing, _start),
     "difference": (_Nothing, _difference),

@@ -40,6 +40,7 @@ __all__ = [
     "Proceed",
     "Redo",
     "Reject",
+    "Reload",
     "Request",
     "Reread",
     "Reset",
@@ -238,6 +239,12 @@ class Reread(Request, frozen=True, tag="reread"):
     """Take the file as it is on the disk, and give up what is not saved."""
 
 
+class Reload(Request, frozen=True, tag="reload"):
+    """Reload a changed module, and replace the nodes whose types it defines."""
+
+    module: Text
+
+
 FromPage: TypeAlias = (
     Join
     | Edit
@@ -263,6 +270,7 @@ FromPage: TypeAlias = (
     | Save
     | Journal
     | Reread
+    | Reload
 )
 
 

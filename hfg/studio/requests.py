@@ -77,6 +77,17 @@ async def _redo(host: Host, viewer: Viewer, message: m.Redo) -> None:
         _told(host, step.changes, viewer, f"redo: {in_words(step.commands)}")
 
 
+async def _reload(host: Host, viewer: Viewer, message: m.Reload) -> None:
+    kinds = {node._type.module for level in level_of(host.graph).walk() for node in level.nodes.values()}
+    if message.module not in kinds:
+        known = ", ".join(sorted(kinds)) or "none"
+        raise Refused("unknown", f'no node type of the graph is from module "{message.module}"; there are {known}')
+    async with host.turn:
+        await host.steering.reload(message.module)
+        host.attribution.note(host.graph, viewer.number, "")
+        host.refresh_all(viewer.number, f"reload {message.module}")
+
+
 async def _arrange(host: Host, viewer: Viewer, message: m.Arrange) -> None:
     root = level_of(host.graph)
     level = root if not message.level else inside(node_at(root, message.level))
@@ -173,6 +184,7 @@ _DO: Final[Mapping[type[m.Request], Callable[[Any, Viewer, Any], Awaitable[Any]]
     m.Edit: _edit,
     m.Undo: _undo,
     m.Redo: _redo,
+    m.Reload: _reload,
     m.Arrange: _arrange,
     m.Start: _start,
     m.Stop: _stop,

@@ -215,6 +215,11 @@ class Steering:
         if not await self._in_run(lambda run: run.redo()):
             self.graph.redo()
 
+    async def reload(self, module: str) -> None:
+        """Reload a module that node types of the graph come from."""
+        if not await self._in_run(lambda run: run.reload(module)):
+            self.graph.reload(module)
+
     async def _in_run(self, do: Callable[[Run], Any]) -> bool:
         """Do it in the run, if there is one, and say so; a run that ends meanwhile leaves it to be done at rest."""
         run = self.run

@@ -21,7 +21,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from hfg.base.logs import Log
-from hfg.errors import UsageError
+from hfg.errors import HfgError, UsageError
 from hfg.studio.entrance import HEADERS, Entrance
 from hfg.studio.messages import LONGEST, SUBPROTOCOL
 from hfg.studio.viewing import Frame
@@ -205,7 +205,11 @@ def application(door: Door, entrance: Entrance, static: Path) -> Any:
             return
         await socket.accept(SUBPROTOCOL)
         outbox = PageOutbox()
-        visit = await door.enter(outbox)
+        try:
+            visit = await door.enter(outbox)
+        except HfgError as error:
+            await socket.close(1013, str(error)[:100])
+            return
         pump = asyncio.create_task(outbox.pump(socket), name="hfg studio page")
         try:
             await _listen(socket, visit, outbox, pump)

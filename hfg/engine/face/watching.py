@@ -2,8 +2,10 @@
 
 `<folder>/<process id>.sock` is there while the run is; a second run of a process has `<process id>-2.sock`. One line
 of JSON asks and one answers: {"want": "name"} or {"want": "glance"}; {"want": "tap", "path": ...} is answered by a
-line, and then a line for each token. Nothing that comes in is ever executed, and there is a limit to each line and to
-how many may ask. While nobody asks nothing is done. Stands on `run`.
+line, and then a line for each token. {"want": "studio"} is answered by a line, and from then on both sides speak the
+protocol of the studio, by which the same user steers and edits the run (`hfg.studio.messages`): a message per line, and
+a binary frame after a line with "!" and its length. There is a limit to each line and to how many may ask. While nobody
+asks nothing is done. Depends on `run`.
 """
 
 from __future__ import annotations
@@ -16,10 +18,11 @@ import socket
 import sys
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import msgspec
 
+from hfg.base.hooks import hooks
 from hfg.base.logs import Log
 from hfg.base.private import MACHINE, is_of_this_user, state_folder
 from hfg.base.sockets import SocketFolder
@@ -47,7 +50,7 @@ class Question(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
       json: of a tap: tokens as JSON, not for people.
     """
 
-    want: Literal["name", "glance", "tap"]
+    want: Literal["name", "glance", "tap", "studio"]
     path: str = ""
     max_rate_hz: float | None = None
     json: bool = False
@@ -98,6 +101,7 @@ class Door:
         self.run = run
         self.guests: set[_Guest] = set()  # from when they knock until they are gone
         self.closed = False
+        self.studio: Any = None  # from the first guest on that wants to steer
         self._empty = asyncio.Event()
         self.name = Answer(os.getpid(), run.graph.name, target, name=name)
 
@@ -109,7 +113,7 @@ class Door:
             return Answer(error=f"the question cannot be understood: {error}")
         if question.want == "name":
             return self.name
-        if question.want == "tap":
+        if question.want in ("tap", "studio"):
             return question
         return msgspec.structs.replace(self.name, glance=self.run.glance())
 
@@ -117,6 +121,8 @@ class Door:
         """Send everybody away, and see them gone: a loop that ends before that leaves their sockets open."""
         self.closed = True
         await asyncio.sleep(0)  # who was let in at this very moment knocks in the loop's next pass
+        if self.studio is not None:
+            await self.studio.close()
         for guest in self.guests:
             guest.send_away()
         if self.guests:
@@ -181,6 +187,7 @@ class _Guest(asyncio.Protocol):
         self._asked = b""
         self._transport: asyncio.Transport | None = None
         self._tapping: asyncio.Task[None] | None = None
+        self._visit: Any = None
         self._may_write = asyncio.Event()
         self._may_write.set()
         self.is_let_in = False
@@ -205,6 +212,8 @@ class _Guest(asyncio.Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._door.leave(self)
+        if self._visit is not None:
+            self._visit.leave()
         if self._tapping is not None:
             self._tapping.cancel()
 
@@ -214,6 +223,8 @@ class _Guest(asyncio.Protocol):
         return self._transport
 
     def pause_writing(self) -> None:
+        if self._visit is not None:
+            return
         self._way.pause_reading()
         self._may_write.clear()
 
@@ -222,6 +233,9 @@ class _Guest(asyncio.Protocol):
         self._may_write.set()
 
     def data_received(self, data: bytes) -> None:
+        if self._visit is not None:
+            self._visit.data_received(data)
+            return
         self._asked += data
         line, newline, rest = self._asked.partition(b"\n")
         if (
@@ -231,7 +245,14 @@ class _Guest(asyncio.Protocol):
         elif newline:
             self._asked = b""
             answer = self._door.answer(line)
-            self._say(self._tap(answer) if isinstance(answer, Question) else answer)
+            if not isinstance(answer, Question):
+                self._say(answer)
+            elif answer.want == "tap":
+                self._say(self._tap(answer))
+            else:
+                self._say(self._door.name)
+                self._way.set_write_buffer_limits()  # its frames are bounded by the credits of the protocol
+                self._visit = hooks.visit_studio(self._door, self._way)
 
     def _say(self, answer: Answer) -> None:
         self._way.write(encode(answer) + b"\n")
