@@ -43,6 +43,17 @@ def _distribute(
     return distribute(graph, flat, options, virtual=virtual, settings=settings)
 
 
+def _studio(*arguments: Any, **options: Any) -> Any:
+    """Implement `Run.studio`; its dependencies are an extra, and imported only if it is used."""
+    from hfg.errors import UsageError
+
+    try:
+        from hfg.studio.notebook import serve_run
+    except ImportError as error:
+        raise UsageError(f'the studio needs {error.name}: pip install "hfg[studio]"') from None
+    return serve_run(*arguments, **options)
+
+
 def _visit_studio(door: Any, transport: Any) -> Any:
     """Implement `hooks.visit_studio`; its dependencies are imported only if another program steers the run."""
     from hfg.studio.local import visit
@@ -82,6 +93,7 @@ def _refusal(
 
 hooks.refusal = _refusal
 hooks.distribute = _distribute
+hooks.studio = _studio
 hooks.visit_studio = _visit_studio
 hooks.record = _record
 hooks.report_page = _report_page

@@ -18,6 +18,7 @@ class _Hooks:
       record: `hfg.recording.record`, for `Run.record`.
       report_page: `hfg.reporting.report_page`, for `Run.report_page`.
       distribute: `hfg.parts.distribution.distribute`, for runs with groups in other processes.
+      studio: `hfg.studio.notebook.serve_run`, for `Run.studio`.
       visit_studio: `hfg.studio.local.visit`, for other programs of the same user that steer a run.
       refusal: why a graph file may not name these references of node types and operators, references in values, or
         types, given which packages are allowed in addition; None if it may.
@@ -26,6 +27,7 @@ class _Hooks:
     record: Callable[..., Any]
     report_page: Callable[..., Any]
     distribute: Callable[..., Any]
+    studio: Callable[..., Any]
     visit_studio: Callable[..., Any]
     refusal: Callable[[Iterable[str], Iterable[str], Iterable[str], Iterable[str]], str | None]
 

@@ -101,7 +101,7 @@ def set(  # noqa: A001 - the verb
     run: _RunNeeded,
     values: Annotated[list[str], typer.Argument(metavar="PATH=VALUE...", help="as in lookup.tolerance=0.2")],
 ) -> int:
-    """Set parameters of a graph that is running in another process; in one step, which undo takes back."""
+    """Set parameters of a graph that is running in another process; as one step of its history."""
     there = find(run)
     if len(there) > 1:
         return which("set", there)

@@ -14,6 +14,7 @@
     requests, asking   what a page asks for                        refusing    a refusal as fields
     running_elsewhere  runs of other programs
     studio       all of it together
+    local, attaching   for other programs of the same user         notebook    for the program itself
     entrance     who may come in            web        the pages' server    serving  its thread and port
 
 All but the last line lives on the loop on which the graph runs and knows nothing of the network, so it needs no extra.

@@ -14,14 +14,15 @@ from typing import Final
 
 from hfg.errors import TargetError
 
-__all__ = ["HEADERS", "Entrance", "is_loopback", "need_guarded"]
+__all__ = ["Entrance", "is_loopback", "need_guarded"]
 
-HEADERS: Final[Mapping[str, str]] = {
-    "Content-Security-Policy": (
-        "default-src 'self'; script-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; "
-        "connect-src 'self'; worker-src 'self' blob:; font-src 'self'; object-src 'none'; base-uri 'none'; "
-        "form-action 'none'; frame-ancestors 'none'"
-    ),
+_POLICY: Final = (
+    "default-src 'self'; script-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; "
+    "connect-src 'self'; worker-src 'self' blob:; font-src 'self'; object-src 'none'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors "
+)
+_NOTEBOOKS: Final = "http://localhost:* http://127.0.0.1:*"
+_HEADERS: Final[Mapping[str, str]] = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -63,9 +64,23 @@ class Entrance:
     Attributes:
       token: what the address holds, once.
       cookie: the name of the cookie; it has the port, because cookies belong to hosts, whatever the port.
+      headers: of every answer.
     """
 
-    def __init__(self, host: str, port: int, *, encrypted: bool = False, names: Iterable[str] = ()) -> None:
+    def __init__(
+        self, host: str, port: int, *, encrypted: bool = False, names: Iterable[str] = (), embedded: bool = False
+    ) -> None:
+        """Make a token.
+
+        Args:
+          host: where the server listens.
+          port: likewise.
+          encrypted: it speaks TLS.
+          names: further names of this machine that browsers may use.
+          embedded: notebooks of this machine may show the page in a frame.
+        """
+        policy = _POLICY + (_NOTEBOOKS if embedded else "'none'")
+        self.headers = {"Content-Security-Policy": policy, **_HEADERS}
         self.token = secrets.token_urlsafe(_TOKEN_BYTES)
         self.cookie = f"hfg-{port}"
         self._secret = secrets.token_urlsafe(_TOKEN_BYTES)
@@ -73,7 +88,7 @@ class Entrance:
         named = f"[{host}]" if ":" in host else host
         hosts = {*_LOOPBACK, *names, *(() if _is_any(host) else (named,))}
         self._hosts = {f"{one}:{port}" for one in hosts} | (hosts if port == (443 if encrypted else 80) else set())
-        self._any_host = _is_any(host) and not names
+        self._any_host = _is_any(host)
         self.encrypted = encrypted
 
     def is_host(self, host: str) -> bool:

@@ -115,7 +115,7 @@ class _Visit:
 
 
 def visit(door: Any, transport: asyncio.Transport) -> _Visit:
-    """Let a program steer the run behind a door; all share one studio."""
+    """Let a program steer the run of a door; all such programs share one studio."""
     if door.studio is None:
         graph = door.run.graph
         door.studio = Studio(Project(graph, Path.cwd()), run=door.run)

@@ -78,7 +78,7 @@ class Server:
         certfile: str | None = None,
         keyfile: str | None = None,
         insecure: bool = False,
-        names: tuple[str, ...] = (),
+        embedded: bool = False,
     ) -> None:
         """Take the port.
 
@@ -89,13 +89,10 @@ class Server:
         need_guarded(host, encrypted=encrypted, insecure=insecure)
         self._socket = _listening(host, port)
         port = self._socket.getsockname()[1]
-        self.entrance = Entrance(host, port, encrypted=encrypted, names=names)
-        shown = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(host, host)
-        shown = f"[{shown}]" if ":" in shown else shown
+        shown = socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+        names = () if shown == host else (shown,)
+        self.entrance = Entrance(host, port, encrypted=encrypted, names=names, embedded=embedded)
         self.address = f"{'https' if encrypted else 'http'}://{shown}:{port}/?token={self.entrance.token}"
-        if shown == socket.gethostname():
-            self.entrance = Entrance(host, port, encrypted=encrypted, names=(*names, shown))
-            self.address = f"{self.address.partition('?')[0]}?token={self.entrance.token}"
         static = Path(os.environ.get("HFG_STUDIO_STATIC") or STATIC)
         config = uvicorn.Config(
             application(door, self.entrance, static),
@@ -138,6 +135,7 @@ def _listening(host: str, port: int | None) -> socket.socket:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listening.bind((host, one))
+            listening.listen()  # now: two sockets that only have the same address would both be content
         except OSError as error:
             listening.close()
             last = error

@@ -22,7 +22,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from hfg.base.logs import Log
 from hfg.errors import HfgError, UsageError
-from hfg.studio.entrance import HEADERS, Entrance
+from hfg.studio.entrance import Entrance
 from hfg.studio.messages import LONGEST, SUBPROTOCOL
 from hfg.studio.viewing import Frame
 
@@ -158,7 +158,9 @@ class _Guard:
         async def with_headers(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
                 headers = [(name, value) for name, value in message.get("headers", []) if name != b"cache-control"]
-                message["headers"] = headers + [(n.lower().encode(), v.encode()) for n, v in HEADERS.items()]
+                message["headers"] = headers + [
+                    (n.lower().encode(), v.encode()) for n, v in self._entrance.headers.items()
+                ]
             await send(message)
 
         await answer(scope, receive, with_headers)

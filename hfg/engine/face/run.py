@@ -276,6 +276,26 @@ class Run:
         page: RunPage = hooks.report_page(self, file, pictures=pictures, picture_size=picture_size)
         return page
 
+    def studio(self, *, port: int | None = None, read_only: bool = False) -> Any:  # noqa: ANN401 - of a higher layer
+        """Serve the studio of this run from now on: a page in the browser that watches, edits and steers it.
+
+        Call it on the run's loop. A notebook shows the result as a frame; `await page.close()` ends the server.
+
+        Args:
+          port: of this computer; default: the first free one from 8800.
+          read_only: the page cannot change or steer anything.
+
+        Returns:
+          The page, with its `address`. Give the address only to people who may run code as you.
+
+        Raises:
+          UsageError: the extra `hfg[studio]` is not installed.
+          TargetError: the port is in use.
+          NotRunning: the run is over.
+        """
+        self._need_running("there is nothing left to steer")
+        return hooks.studio(self, port=port, read_only=read_only)
+
     @overload
     def set(self, parameter: ParameterPort[T], value: T) -> None: ...
     @overload

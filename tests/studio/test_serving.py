@@ -1,0 +1,181 @@
+"""Real servers: from the program's own, from the command, after a sudden end."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+import websockets
+
+import hfg
+from hfg.errors import TargetError
+from hfg.studio.messages import SUBPROTOCOL
+from hfg.studio.serving import Server, StudioDoor
+from tests.limits import patience
+from tests.studio.page import live, studio_of
+from tests.studio.test_studio import doubling, ticking
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+async def come_in(address: str) -> websockets.ClientConnection:
+    """Open an address as a browser does."""
+    base = address.partition("/?")[0]
+    async with httpx2.AsyncClient() as client:
+        answer = await client.get(address)
+    cookie = answer.headers["set-cookie"].partition(";")[0]
+    return await websockets.connect(
+        f"{base.replace('http', 'ws')}/ws",
+        subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]  # a text with a type of its own
+        additional_headers={"Cookie": cookie},
+        origin=base,  # type: ignore[arg-type]
+    )
+
+
+async def until(socket: websockets.ClientConnection, kind: str) -> Any:
+    async with asyncio.timeout(patience(10)):
+        while True:
+            message = json.loads(await socket.recv())
+            if message["t"] == kind:
+                return message
+
+
+async def ask(socket: websockets.ClientConnection, **message: Any) -> Any:
+    await socket.send(json.dumps({"id": 1, **message}))
+    return await until(socket, "reject" if message.get("refused") else "ack")
+
+
+@pytest.mark.slow
+def test_a_program_shows_its_own_run() -> None:
+    async def main() -> None:
+        async with hfg.running(ticking()) as run:
+            page = run.studio()
+            assert "<iframe" in page._repr_html_()
+            async with await come_in(page.address) as socket:
+                await socket.send('{"t":"join"}')
+                snapshot = await until(socket, "snapshot")
+                assert set(snapshot["tables"]["nodes"]) == {"clock", "count"}
+                await ask(socket, t="pause")
+                assert run.paused
+            await page.close()
+
+    live(main)
+
+
+@pytest.mark.slow
+def test_the_graph_goes_on_while_a_page_reads_nothing() -> None:
+    async def main() -> None:
+        async with hfg.running(ticking()) as run:
+            page = run.studio()
+            async with await come_in(page.address) as socket:
+                await socket.send('{"t":"join"}')
+                await socket.send('{"t":"sub","sub":1,"topic":"history","hz":60,"args":{"path":"clock.out"}}')
+                for value in range(2000):
+                    await run.trigger("clock.tick", value)
+                await run.wait_quiet()
+                assert run.graph["count"].calls == 2000
+            await page.close()
+
+    live(main)
+
+
+@pytest.mark.slow
+def test_a_port_in_use_is_said_in_words() -> None:
+    async def main() -> None:
+        studio = studio_of(doubling())
+        door = StudioDoor(asyncio.get_running_loop(), studio)
+        server = Server(door)
+        server.start()
+        port = int(re.findall(r":(\d+)/", server.address)[0])
+        with pytest.raises(TargetError, match=f"port {port} of 127.0.0.1 cannot be taken"):
+            Server(door, port=port)
+        await server.stop()
+
+    live(main)
+
+
+@contextmanager
+def command(*arguments: str, folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """The command in a process of its own, and the address that it prints."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "XDG_STATE_HOME": str(folder / "state")}
+    program = [sys.executable, "-m", "hfg", "studio", *arguments, "--no-browser"]
+    process = subprocess.Popen(program, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        yield process, process.stdout.readline().strip()
+    finally:
+        process.kill()
+        process.wait(patience(10))
+        assert process.stdout is not None
+        process.stdout.close()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+def test_edits_are_offered_after_the_server_was_killed(tmp_path: Path) -> None:
+    hfg.save(doubling(), tmp_path / "doubling.hfg.yaml")
+    arguments = ("doubling.hfg.yaml", "--allow", "tests")
+
+    async def edited(address: str) -> None:
+        async with await come_in(address) as socket:
+            await socket.send('{"t":"join"}')
+            await until(socket, "snapshot")
+            await ask(socket, t="edit", commands=[{"do": "SetParameter", "path": "scaled.factor", "value": 9}])
+
+    async def taken_up(address: str) -> None:
+        async with await come_in(address) as socket:
+            await socket.send('{"t":"join"}')
+            tables = (await until(socket, "snapshot"))["tables"]
+            assert tables["studio"]["file"]["journal"]["changes"] == 1
+            assert tables["nodes"]["scaled"]["parameters"]["factor"] == 2
+            await ask(socket, t="journal", take=True)
+            await ask(socket, t="save")
+
+    with command(*arguments, folder=tmp_path) as (process, address):
+        asyncio.run(edited(address))
+        process.send_signal(signal.SIGKILL)
+        process.wait(patience(10))
+    with command(*arguments, folder=tmp_path) as (process, address):
+        asyncio.run(taken_up(address))
+        process.send_signal(signal.SIGINT)
+        process.wait(patience(10))
+    assert hfg.load(tmp_path / "doubling.hfg.yaml", allow=["tests"])["scaled"].factor == 9
+
+
+@pytest.mark.slow
+@pytest.mark.rule("L5")
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--host", "0.0.0.0"), "write --insecure"),
+        (("run.mcap",), "recordings cannot be opened in the studio yet"),
+        (("--attach", "99999999"), "no graph that could be looked at runs in process 99999999"),
+        (("missing.hfg.yaml",), "missing.hfg.yaml"),
+    ],
+)
+def test_what_cannot_be_served_is_said_in_one_sentence(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    says: str,
+) -> None:
+    from hfg.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    assert main(["studio", *arguments, "--no-browser"]) == 2
+    said = capfd.readouterr().err
+    assert says in said
+    assert said.count("\n") == 1
