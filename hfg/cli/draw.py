@@ -32,10 +32,7 @@ def draw(
     ] = "used",
     view: Annotated[
         Literal["activity", "mission", "all"] | None,
-        typer.Option(
-            help="What an SVG shows: states and what feeds them, all with data in bundles, or each edge by itself. "
-            "Default: mission if activity moves between nodes, else all."
-        ),
+        typer.Option(help="An SVG shows states and what feeds them, all with bundles, or each edge by itself."),
     ] = None,
     arg: ArgOption = None,
     allow: AllowOption = None,

@@ -15,7 +15,7 @@ import msgspec
 from hfg.base.logs import Log
 from hfg.graph import Graph, drawing
 from hfg.graph.drawing import View
-from hfg.graph.drawing.picture import Kind
+from hfg.graph.drawing.seen import Kind
 from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.pointing import node_at
 from hfg.studio.tables import Tables

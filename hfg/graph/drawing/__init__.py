@@ -7,7 +7,7 @@ svg         as SVG                 formats  as SVG, Mermaid or DOT, into a file
 from hfg.graph.drawing.formats import FORMATS, dot, draw, mermaid, view_of
 from hfg.graph.drawing.layout import lay_out
 from hfg.graph.drawing.model import Badge, EdgeEnds, Layout, Line, NodeBox, PortSpot, Tag
-from hfg.graph.drawing.picture import View
+from hfg.graph.drawing.seen import View
 from hfg.graph.drawing.svg import svg
 
 __all__ = [

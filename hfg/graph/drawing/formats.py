@@ -15,7 +15,8 @@ from typing import Any, Final, cast, get_args
 from hfg.base.controls import escaped
 from hfg.base.whole import write_whole
 from hfg.errors import GraphError, UsageError
-from hfg.graph.drawing.picture import EVERYTHING, Arrow, Kind, Picture, Shape, View, picture
+from hfg.graph.drawing.picture import picture
+from hfg.graph.drawing.seen import EVERYTHING, Arrow, Kind, Picture, Shape, View
 from hfg.graph.drawing.svg import svg
 from hfg.graph.structure.level import HasLevel, Level, level_of
 from hfg.graph.structure.pointing import meant, node_at

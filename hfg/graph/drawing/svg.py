@@ -24,7 +24,7 @@ from hfg.graph.drawing.layout.blocks import (
     badge_width,
 )
 from hfg.graph.drawing.model import Badge, Layout, Line, NodeBox, Point, PortSpot, Tag
-from hfg.graph.drawing.picture import EVERYTHING, View
+from hfg.graph.drawing.seen import EVERYTHING, View
 from hfg.graph.drawing.text import FONTS, escaped, is_measured, shortened, width_of
 from hfg.graph.drawing.tokens import STYLE, stripe
 from hfg.graph.structure.level import HasLevel
@@ -340,7 +340,7 @@ def _legend(laid: Layout) -> Iterator[tuple[float, str]]:
         ({"signal"}, _sample(Line((), "signal", points=across)), 34, "signals"),
         ({"active edge"}, _sample(Line((), "signal", is_active=True, points=across)), 34, "activity"),
         ({"bundle"}, "".join(_on_line(Line((), "data", count_at=(12.0, 0.0), says="3"))), 24, "so many edges"),
-        ({"tag"}, '<rect class="hfg-pill" x="2" y="-7" width="24" height="14" rx="7"/>', 28, "port of all this"),
+        ({"tag"}, '<rect class="hfg-pill" x="2" y="-7" width="24" height="14" rx="7"/>', 28, "port of this graph"),
         ({"gate"}, icon.format(_GATE), 16, "rests unless active"),
         ({"timeout"}, icon.format(_CLOCK), 16, "time limit"),
         ({"active node"}, '<rect class="hfg-body hfg-on" x="2" y="-6" width="20" height="12" rx="3"/>', 26, "active"),

@@ -13,12 +13,15 @@ it cuts the circles of mission and data at the wrong places, whatever the priori
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from hfg.graph.drawing.layout.finishing import lines_of, node_of
 from hfg.graph.drawing.layout.laying import lay
 from hfg.graph.drawing.layout.parts import Work
 from hfg.graph.drawing.layout.wiring import Level, Levels, wired
 from hfg.graph.drawing.model import Layout, Line, NodeBox
-from hfg.graph.drawing.picture import EVERYTHING, Kind, View, picture
+from hfg.graph.drawing.picture import picture
+from hfg.graph.drawing.seen import EVERYTHING, Kind, Picture, View
 from hfg.graph.structure.level import HasLevel
 
 __all__ = ["lay_out"]
@@ -51,23 +54,27 @@ def lay_out(graph: HasLevel, view: View = EVERYTHING) -> Layout:
         nets += 2 * len(work.links)
         works[id(level)] = work, kind
         if level.box is not None:
+            work.box = level.box.id
             inner[level.box.id] = work.width, work.height
+    return _drawn(seen, [works[id(level)] for level in found], inner)
+
+
+def _drawn(seen: Picture, works: Sequence[tuple[Work, Kind]], inner: Mapping[str, tuple[float, float]]) -> Layout:
+    """Put each level into its subgraph, and return all of it as data."""
     nodes: list[NodeBox] = []
     lines: list[Line] = []
     places: dict[str, tuple[float, float]] = {}
-    for level in found:
-        work, kind = works[id(level)]
-        x, y = (0.0, 0.0) if level.box is None else places[level.box.id]
+    for work, kind in works:
+        work.move(*places.get(work.box, (0.0, 0.0)))
         for thing in work.things:
-            nodes.append(node_of(thing, x, y, has_rows=work.has_rows, has_ports=kind != "activity"))
+            nodes.append(node_of(thing, has_rows=work.has_rows, has_ports=kind != "activity"))
             if thing.shape.look == "box":
-                inside = inner[thing.shape.id]
-                places[thing.shape.id] = x + thing.x + _PAD, y + thing.y + thing.height - inside[1] - _PAD
-        lines += lines_of(work, x, y)
-    root, kind = works[id(found[0])]
+                places[thing.shape.id] = thing.x + _PAD, thing.y + thing.height - inner[thing.shape.id][1] - _PAD
+        lines += lines_of(work)
     lines.sort(key=lambda line: (line.is_active, line.kind == "signal"))
     shown = {edge.label for line in lines for edge in line.edges}
     hidden = sum(not arrow.is_gate and " -> ".join(arrow.ends) not in shown for arrow in seen.arrows)
+    root, kind = works[0]
     return Layout(seen.title, kind, root.width, root.height, tuple(nodes), tuple(lines), tuple(seen.groups), hidden)
 
 

@@ -53,7 +53,7 @@ _COMB: Final = 10.0  # others
 _LEAST: Final = 22.0  # between ports side by side
 _MEASURED: Final = (72.0, 176.0)  # a node with bars
 TAG_HEIGHT: Final = 14.0
-TO_TAG: Final = 8.0  # the line from a port to its tag
+TO_TAG: Final = 6.0  # the line from a port to its tag
 
 
 def up(number: float, grid: float = GRID) -> float:
@@ -75,7 +75,7 @@ def tag_text(names: Sequence[str], *, is_in: bool) -> str:
 
 def tag_width(text: str) -> float:
     """Return how wide a tag is."""
-    return math.ceil(width_of(text, TAG) + 12.0)
+    return math.ceil(width_of(text, TAG) + 10.0)
 
 
 def size(thing: Thing, *, measured: bool, inner: tuple[float, float] | None = None) -> None:
@@ -89,9 +89,8 @@ def size(thing: Thing, *, measured: bool, inner: tuple[float, float] | None = No
     ]
     header = _header(thing, sides)
     wide = [_title_width(thing), *(sum(map(room, sides[side])) + _PAD for side in ("top", "bottom"))]
-    rows = max(
-        (len(sides[side]) if any(one.says for one in sides[side]) else 0 for side in ("left", "right")), default=0
-    )
+    named = [sides[side] for side in ("left", "right") if _is_named(sides[side])]
+    rows = max((len(spots) + sum(bool(one.tagged) and one.is_linked for one in spots) for spots in named), default=0)
     if rows:
         wide.append(names[0] + names[1] + 32.0)
     details = "  ".join(thing.shape.details)
@@ -165,7 +164,8 @@ def _beside(spots: Sequence[Spot]) -> float:
 def _order_upright(spot: Spot) -> tuple[object, ...]:
     """Return the order of ports on the left and right: bundles first, then single lines, then tags, then parameters."""
     only_tag = bool(spot.tagged) and not spot.is_linked
-    return spot.kind == "parameter", only_tag, spot.comb < 0, spot.comb, spot.order, spot.name
+    has_both = bool(spot.tagged) and spot.is_linked  # its tag is below it
+    return spot.kind == "parameter", has_both, only_tag, spot.comb < 0, spot.comb, spot.order, spot.name
 
 
 def _place_upright(thing: Thing, sides: dict[str, list[Spot]], header: float) -> None:
@@ -175,7 +175,7 @@ def _place_upright(thing: Thing, sides: dict[str, list[Spot]], header: float) ->
         at = header + 9.0 if _is_named(spots) else thing.height / 2 - pitch * (len(spots) - 1) / 2
         for spot in spots:
             spot.at = at
-            at += pitch
+            at += pitch * (2 if pitch == _ROW and spot.tagged and spot.is_linked else 1)
 
 
 def place_level(thing: Thing, spine: Mapping[Side, Spot | None]) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import Final, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 from hfg.graph.drawing.layout.blocks import LONGEST_SAID, PORT, TAG_HEIGHT, TO_TAG, tag_text, tag_width
 from hfg.graph.drawing.layout.parts import Link, Spot, Thing, Work
 from hfg.graph.drawing.model import EdgeEnds, Line, NodeBox, Point, PortSpot, Tag
-from hfg.graph.drawing.picture import Arrow
+from hfg.graph.drawing.seen import Arrow
 from hfg.graph.drawing.text import shortened, width_of
 
 __all__ = ["lines_of", "node_of"]
@@ -21,39 +21,29 @@ Box: TypeAlias = tuple[float, float, float, float]
 """Left, top, right and bottom."""
 
 
-def node_of(thing: Thing, x: float, y: float, *, has_rows: bool, has_ports: bool) -> NodeBox:
-    """Return a thing as it is drawn, with its level so far from the corner of the picture."""
+def node_of(thing: Thing, *, has_rows: bool, has_ports: bool) -> NodeBox:
+    """Return a thing as it is drawn."""
     shape = thing.shape
-    ports = []
-    for spot in thing.spots.values() if has_ports else ():
-        at_x, at_y = thing.where(spot)
-        ports.append(PortSpot(spot.kind, spot.name, x + at_x, y + at_y, spot.says))
+    spots = thing.spots.values() if has_ports else ()
     is_box = shape.look == "box"
     return NodeBox(
-        shape.path or shape.id,
-        shape.name,
-        "subgraph" if is_box or shape.inner else "node" if shape.look == "node" else "wire",
-        shape.type_name,
-        shape.group,
-        x + thing.x,
-        y + thing.y,
-        thing.width,
-        thing.height,
-        thing.row if has_rows and shape.is_state else None,
-        thing.lane,
-        shape.is_state,
-        shape.is_active,
-        shape.is_enabled,
-        is_box,
-        shape.inner,
-        tuple(shape.details),
-        tuple(thing.badges),
-        tuple(ports),
+        id=shape.path or shape.id,
+        name=shape.name,
+        kind="subgraph" if is_box or shape.inner else "node" if shape.look == "node" else "wire",
+        type_name=shape.type_name,
+        group=shape.group,
+        **{name: getattr(thing, name) for name in ("x", "y", "width", "height", "lane")},
+        row=thing.row if has_rows and shape.is_state else None,
+        **{name: getattr(shape, name) for name in ("is_state", "is_active", "is_enabled", "inner")},
+        is_open=is_box,
+        details=tuple(shape.details),
+        badges=tuple(thing.badges),
+        ports=tuple(PortSpot(one.kind, one.name, *thing.where(one), one.says) for one in spots),
     )
 
 
-def lines_of(work: Work, x: float, y: float) -> Iterator[Line]:
-    """Yield all lines of a level as they are drawn, with the level so far from the corner of the picture."""
+def lines_of(work: Work) -> Iterator[Line]:
+    """Yield all lines of a level as they are drawn."""
     tagged = list(_tagged(work.things, work.links))
     inner = [link for link in work.links if link.tail is not None and link.head is not None]
     for link in inner:
@@ -61,63 +51,25 @@ def lines_of(work: Work, x: float, y: float) -> Iterator[Line]:
     dots = _dots(inner)
     taken = _Taken(work.things, [tag for _, _, tag in tagged], inner)
     for link in inner:
-        count_at = taken.pill(link, inner) if len(link.tail_spots) > 1 else None
-        says_at = taken.text(link, link.said) if link.said else None
-        said = link.said or ", ".join(dict.fromkeys(arrow.said for arrow in link.arrows if arrow.said))
-        yield _moved(_line(link.arrows, link.points, link, dots.get(id(link), ()), count_at, said, says_at, None), x, y)
+        yield _line(
+            link.arrows,
+            link.points,
+            is_back=link.is_back,
+            combs=tuple(map(tuple, link.combs)),
+            dots=tuple(dots.get(id(link), ())),
+            count_at=taken.pill(link, inner) if len(link.tail_spots) > 1 else None,
+            says=link.said or ", ".join(dict.fromkeys(arrow.said for arrow in link.arrows if arrow.said)),
+            says_at=taken.text(link, link.said) if link.said else None,
+            net=link.net,
+        )
     for arrows, points, tag in tagged:
-        yield _moved(_line(arrows, points, None, (), None, "", None, tag), x, y)
+        yield _line(arrows, points, tag=tag)
 
 
-def _line(
-    arrows: Sequence[Arrow],
-    points: Sequence[Point],
-    link: Link | None,
-    dots: Iterable[Point],
-    count_at: Point | None,
-    said: str,
-    says_at: Point | None,
-    tag: Tag | None,
-) -> Line:
-    first = arrows[0]
-    return Line(
-        tuple(EdgeEnds(*arrow.ends, " -> ".join(arrow.ends)) for arrow in arrows),
-        "signal" if first.is_signal else "data",
-        first.is_active,
-        link is not None and link.is_back,
-        tuple(points),
-        () if link is None else tuple(tuple(comb) for comb in link.combs),
-        tuple(dots),
-        count_at,
-        said,
-        says_at,
-        tag,
-        -1 if link is None else link.net,
-    )
-
-
-def _moved(line: Line, x: float, y: float) -> Line:
-    def to(point: Point | None) -> Point | None:
-        return None if point is None else (point[0] + x, point[1] + y)
-
-    def all_to(points: Iterable[Point]) -> tuple[Point, ...]:
-        return tuple((at_x + x, at_y + y) for at_x, at_y in points)
-
-    tag = line.tag
-    return Line(
-        line.edges,
-        line.kind,
-        line.is_active,
-        line.is_back,
-        all_to(line.points),
-        tuple(map(all_to, line.combs)),
-        all_to(line.dots),
-        to(line.count_at),
-        line.says,
-        to(line.says_at),
-        None if tag is None else Tag(tag.text, tag.ports, tag.kind, tag.x + x, tag.y + y, tag.width, tag.height),
-        line.net,
-    )
+def _line(arrows: Sequence[Arrow], points: Sequence[Point], **more: Any) -> Line:  # noqa: ANN401 - fields of a line
+    edges = tuple(EdgeEnds(*arrow.ends, " -> ".join(arrow.ends)) for arrow in arrows)
+    kind: Literal["data", "signal"] = "signal" if arrows[0].is_signal else "data"
+    return Line(edges, kind, arrows[0].is_active, points=tuple(points), **more)
 
 
 # --- tags
@@ -130,10 +82,10 @@ def _tagged(things: Sequence[Thing], links: Sequence[Link]) -> Iterator[tuple[li
         thing, spot, is_in = _tag_end(link)
         if thing is not None and spot is not None:
             side = [one for one in thing.spots.values() if one.side == spot.side]
-            is_shared = spot.side in ("left", "right") and not any(one.says for one in side) and not spot.is_linked
             key: tuple[object, ...] = (id(spot), is_in)
-            if is_shared:
-                key = (thing.number, spot.side, is_in, link.is_signal, link.is_active, link.is_jump)
+            if spot.side in ("left", "right") and not any(one.says for one in side):  # they share one
+                look = () if spot.is_linked else (link.is_signal, link.is_active, link.is_jump)
+                key = (thing.number, spot.side, is_in, *look)
             groups.setdefault(key, []).append(link)
     for members in groups.values():
         members.sort(key=lambda one: not one.is_active)
@@ -142,7 +94,10 @@ def _tagged(things: Sequence[Thing], links: Sequence[Link]) -> Iterator[tuple[li
         assert spot is not None
         spots = list({id(one): one for link in members if (one := _tag_end(link)[1]) is not None}.values())
         names = list(dict.fromkeys(name for one in spots for name in one.tagged))
-        at = thing.where(spot)[0], sum(thing.where(one)[1] for one in spots) / len(spots)
+        if spot.is_linked:  # it stands below the last of them
+            at = max((thing.where(one) for one in spots), key=lambda place: place[1])
+        else:
+            at = thing.where(spot)[0], sum(thing.where(one)[1] for one in spots) / len(spots)
         points, tag = _tag(spot, at, names, _kind_of_tag(members[0], is_in=is_in))
         for number, one in enumerate(spots):
             own = [arrow for link in members if _tag_end(link)[1] is one for arrow in link.arrows]
@@ -179,7 +134,7 @@ def _tag(spot: Spot, at: Point, names: Sequence[str], kind: str) -> tuple[list[P
     sign = -1 if spot.side in ("left", "top") else 1
     if spot.side in ("left", "right"):
         if spot.is_linked:
-            points = [(x, y), (x + 8 * sign, y), (x + 8 * sign, y + 14), (x + TO_TAG * sign, y + 14)]
+            points = [(x, y), (x + 4 * sign, y), (x + 4 * sign, y + 14), (x + TO_TAG * sign, y + 14)]
             y += 14.0
         else:
             points = [(x, y), (x + TO_TAG * sign, y)]
@@ -194,8 +149,8 @@ def _tag(spot: Spot, at: Point, names: Sequence[str], kind: str) -> tuple[list[P
 
 def _to_bar(port: Point, points: Sequence[Point]) -> list[Point]:
     """Lead from one of several ports to the tag that they share."""
-    (_, y), (end, _) = points[0], points[-1]
-    bar = port[0] + (end - port[0]) * 0.6
+    (x, _), (end, y) = points[0], points[-1]
+    bar = x + (end - x) * 0.6
     return [port, (bar, port[1]), (bar, y), (end, y)] if port[1] != y else [port, (end, y)]
 
 

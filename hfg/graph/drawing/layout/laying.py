@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
 from hfg.graph.drawing.layout.blocks import GRID, halves, place_level, room, rooms_beside, size, up
 from hfg.graph.drawing.layout.grid import GUTTER, Grid
-from hfg.graph.drawing.layout.parts import Link, Side, Spot, Thing, Work
-from hfg.graph.drawing.layout.placing import GAP, place, spine_of
+from hfg.graph.drawing.layout.parts import GAP, Link, Side, Spot, Thing, Work
+from hfg.graph.drawing.layout.placing import place, spine_of
 from hfg.graph.drawing.layout.routing import Leg, corners, ends_of, route
 from hfg.graph.drawing.layout.tracks import Way, needed, tracks_of
-from hfg.graph.drawing.picture import Kind, View
+from hfg.graph.drawing.seen import Kind, View
 
 __all__ = ["lay"]
 
-_GUTTER_PAD: Final = 13.0  # from a lane to the first track: there is room for a comb
+_GUTTER_PAD: Final = 12.0  # from a lane to the first track: there is room for a comb
 _GAP_PAD: Final = 12.0  # from a row to the first track: there is room for the head of an arrow
 _TALL: Final = 120.0  # such a thing is not in the middle of its row
 _ALIKE: Final = 48.0  # things of one lane that are nearly as wide are made as wide
 _ROUNDS: Final = 4
+_STEP: Final = 12.0  # a step up or down of at most that is made straight
 _SHIFT: Final = 9.0
 
 
@@ -38,7 +39,7 @@ def lay(work: Work, view: View, kind: Kind, inner_sizes: Mapping[str, tuple[floa
         for thing in work.things:
             for spot in thing.spots.values():
                 spot.is_linked = False
-        work.links = list(_jumping(work.links))
+        work.links = _jumping(work.links)
     _order_ports(work)
     inner = [link for link in work.links if link.tail is not None and link.head is not None]
     _Lanes(work, inner).lay()
@@ -50,22 +51,28 @@ def lay(work: Work, view: View, kind: Kind, inner_sizes: Mapping[str, tuple[floa
         work.height = max((one.y + one.height + one.bottom for one in work.things), default=0.0)
 
 
-def _jumping(links: Sequence[Link]) -> Iterator[Link]:
+def _jumping(links: Sequence[Link]) -> list[Link]:
     """Let no data or signal run against the mission: what leads to the left or up is a tag at both its ends."""
+    drawn: list[Link] = []
+    jumps: list[tuple[Thing, Thing, Link]] = []
     for link in links:
         tail, head = link.tail, link.head
         if tail is None or head is None:
-            yield link
+            drawn.append(link)
         elif link.is_active or tail.lane < head.lane or (tail.lane == head.lane and _may_turn(link)):
-            yield link
+            drawn.append(link)
             for spot in (*link.tail_spots, *link.head_spots):
                 spot.is_linked = True
         else:
-            for arrow, begin, end in zip(link.arrows, link.tail_spots, link.head_spots, strict=True):
-                begin.tagged.append(f"→ {head.shape.name}")
+            jumps.append((tail, head, link))
+    for tail, head, link in jumps:
+        for arrow, begin, end in zip(link.arrows, link.tail_spots, link.head_spots, strict=True):
+            begin.tagged.append(f"→ {head.shape.name}")
+            drawn.append(Link([arrow], tail, None, [begin], [], link.net, is_jump=True))
+            if not (end.is_linked and end.comb >= 0):  # there is no room for a tag within a comb
                 end.tagged.append(tail.shape.name)
-                yield Link([arrow], tail, None, [begin], [], link.net, is_jump=True)
-                yield Link([arrow], None, head, [], [end], link.net, is_jump=True)
+                drawn.append(Link([arrow], None, head, [], [end], link.net, is_jump=True))
+    return drawn
 
 
 def _may_turn(link: Link) -> bool:
@@ -86,7 +93,8 @@ def _order_ports(work: Work) -> None:
         if tail is None or head is None:
             continue
         for thing, other, spots in ((tail, head, link.tail_spots), (head, tail, link.head_spots)):
-            pull = 100.0 * link.via if link.is_back else 10.0 * (other.lane - thing.lane) or 1.0
+            # The further down the other end is, the further out: so lines from one side do not cross.
+            pull = 100.0 * link.via if link.is_back else (10.0 + other.row / 100) * (other.lane - thing.lane) or 1.0
             for spot in spots:
                 pulls.setdefault(id(spot), []).append(pull)
     for thing in work.things:
@@ -154,6 +162,7 @@ class _Lanes:
     def lay(self) -> None:
         """Find ways, then widen channels until all tracks have room."""
         self._stretch()
+        _straighten(self.links)
         legs = route(self.links, self.grid)
         for _ in range(_ROUNDS):
             ways = _ways(self.links, legs, self.grid)
@@ -273,6 +282,21 @@ def _lead(links: Sequence[Link], grid: Grid) -> None:
 def _draw(links: Sequence[Link], ways: Sequence[Way]) -> None:
     for link, way in zip(links, ways, strict=True):
         link.points = corners(way.legs, way.at, way.tail, way.head)
+
+
+def _straighten(links: Sequence[Link]) -> None:
+    """Move ports that are the only one on their side, so that lines with a small step become straight."""
+    for link in links:
+        tail, head = link.tail, link.head
+        assert tail is not None
+        assert head is not None
+        step = head.where(link.head_spots[0])[1] - tail.where(link.tail_spots[0])[1]
+        if not 0 < abs(step) <= _STEP or link.tail_spots[0].side != "right" or link.head_spots[0].side != "left":
+            continue
+        for thing, spot, by in ((tail, link.tail_spots[0], step), (head, link.head_spots[0], -step)):
+            if len(thing.on(spot.side)) == 1 and not spot.says and 10.0 <= spot.at + by <= thing.height - 10.0:
+                spot.at += by
+                break
 
 
 def _part_ends(links: Sequence[Link]) -> bool:

@@ -10,12 +10,13 @@ from typing import Final, Literal, TypeAlias
 import msgspec
 
 from hfg.graph.drawing.model import Badge
-from hfg.graph.drawing.picture import Arrow, Shape
+from hfg.graph.drawing.seen import Arrow, Shape
 
-__all__ = ["SIDES", "Link", "Side", "Spot", "Thing", "Work"]
+__all__ = ["GAP", "SIDES", "Link", "Side", "Spot", "Thing", "Work"]
 
 Side: TypeAlias = Literal["left", "right", "top", "bottom"]
 
+GAP: Final = 28.0  # between two rows: three tracks
 SIDES: Final[dict[str, Side]] = {"input": "left", "output": "right", "slot": "top", "event": "bottom"}
 
 
@@ -135,5 +136,13 @@ class Work(msgspec.Struct, eq=False):
     things: list[Thing]
     links: list[Link]
     has_rows: bool = False
+    box: str = ""
     width: float = 0.0
     height: float = 0.0
+
+    def move(self, x: float, y: float) -> None:
+        """Put everything that far further right and down."""
+        for thing in self.things:
+            thing.x, thing.y = thing.x + x, thing.y + y
+        for link in self.links:
+            link.points = [(at_x + x, at_y + y) for at_x, at_y in link.points]

@@ -13,7 +13,7 @@ from typing import Final
 from hfg.graph.drawing.layout.overview import to_overview
 from hfg.graph.drawing.layout.parts import SIDES, Link, Spot, Thing, Work
 from hfg.graph.drawing.model import Badge
-from hfg.graph.drawing.picture import Arrow, Kind, Picture, Pin, Shape, View
+from hfg.graph.drawing.seen import Arrow, Kind, Picture, Pin, Shape, View
 
 __all__ = ["Level", "Levels", "wired"]
 
