@@ -14,7 +14,7 @@ RESULTS := benchmarks/results
 PEERS   := .venv-peers
 
 .DEFAULT_GOAL := help
-.PHONY: help demo photographs test test-fast lint bench peers bench-peers bench-goals bench-docs bench-links docs docs-nodes docs-drawings docs-mermaid web test-web soak setup clean
+.PHONY: help demo photographs test test-fast lint bench peers bench-peers bench-goals bench-docs bench-links docs docs-nodes docs-drawings docs-mermaid docs-studio web test-web soak setup clean
 
 help:
 	@echo "make demo    a robot fetches and delivers cubes; score, video and report in out/fetch_delivery, in less than 3 minutes"
@@ -28,6 +28,7 @@ help:
 	@echo "make docs-nodes   write docs/nodes from the docstrings of the library"
 	@echo "make docs-drawings   redraw the graphs in README and docs"
 	@echo "make docs-mermaid   draw the Mermaid diagrams in docs for the site; needs Chromium and npm"
+	@echo "make docs-studio    take the pictures of the studio in docs from the page; needs Chromium"
 	@echo "make web     build the page of the studio into hfg/studio/static; needs Node 20 and npm"
 	@echo "make test-web   check the page of the studio alone: types and unit tests; needs Node 20 and npm"
 	@echo "make soak    run the tests that take minutes"
@@ -86,6 +87,9 @@ docs: $(READY)
 
 docs-mermaid: $(READY)
 	$(BIN)/python -m tools.draw_mermaid
+
+docs-studio: $(READY)
+	$(BIN)/python -m tools.draw_studio
 
 docs-drawings: $(READY)
 	HFG_REDRAW=1 $(BIN)/python -m pytest -q tests/test_drawings.py

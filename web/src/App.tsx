@@ -21,7 +21,7 @@ export function App() {
   const theme = useStudio((s) => s.theme);
   const side = useStudio((s) => s.side);
   const old = useStudio((s) => s.age === 3);
-  const start = useStudio((s) => s.rev >= 0 && Object.keys(s.tables.nodes).length === 0 && s.tables.studio.file?.kind === "none");
+  const start = useStudio((s) => s.rev >= 0 && !s.begun && Object.keys(s.tables.nodes).length === 0 && s.tables.studio.file?.kind === "none");
   useKeys();
   useFailures();
   useEffect(() => {

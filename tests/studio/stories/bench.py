@@ -81,7 +81,8 @@ class Bench:
     def mend(self) -> None:
         """The network is back at the same port; pages have their cookies of before."""
         entrance, port = self.server.entrance, int(self.address.split(":")[2].split("/")[0])
-        self.server = Server(StudioDoor(self._loop, self.studio), port=port, entrance=entrance)
+        self.server = Server(StudioDoor(self._loop, self.studio), port=port)
+        vars(self.server.entrance).update(vars(entrance))
         self.server.start()
 
     def close(self) -> None:

@@ -60,12 +60,14 @@ def test_the_run_ends_when_one_stops_it(story: Story) -> None:
 
 
 def test_whoever_has_the_activity_has_the_ring(story: Story) -> None:
+    story.graph["rest"].duration = 5.0
     story.start()
     rest = story.node("rest")
     expect(rest).to_have_class(re.compile(r"\bactive\b"))
     assert "rest" in story.bench.active
-    expect(rest).not_to_have_class(re.compile(r"\bactive\b"))
+    story.bench.call(lambda: setattr(story.graph["rest"], "duration", 0.1))
     expect(story.node("errand")).to_contain_text(re.compile("there|back"))
+    expect(story.node("errand")).to_have_class(re.compile(r"\bactive\b"))
 
 
 def test_the_reset_of_activity_begins_at_the_start_again(story: Story) -> None:

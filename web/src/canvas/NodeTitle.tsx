@@ -20,7 +20,7 @@ export function NodeTitle({ box, record, top, plain }: Props) {
       {!plain && (
         <>
           <span className="sp" />
-          {(box.badges ?? []).map((badge) =>
+          {box.badges.map((badge) =>
             badge.kind === "gate" ? (
               <GateBadge key={`g${badge.by}${badge.says}`} says={badge.says} by={badge.by || box.id} own={badge.says === ""} />
             ) : (

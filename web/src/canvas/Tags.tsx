@@ -1,9 +1,10 @@
 import { useState } from "react";
 import type { LayoutRecord, LayoutTag } from "../protocol/types";
-import { joined } from "../state/paths";
+import { useStudio } from "../state/studio";
 
 /** A port of the level itself is a tag at each place where it is used; hover lights up all of one name. */
 export function Tags({ layout }: { layout: LayoutRecord }) {
+  const level = useStudio((s) => s.level);
   const [lit, setLit] = useState<readonly string[]>([]);
   const tags = new Map<string, { tag: LayoutTag; dashed: boolean }>();
   for (const line of layout.lines) {
@@ -16,7 +17,7 @@ export function Tags({ layout }: { layout: LayoutRecord }) {
           key={key}
           className={`tagg${dashed ? " sg" : ""}${tag.ports.some((port) => lit.includes(port)) ? " lit" : ""}`}
           style={{ left: tag.x, top: tag.y, width: tag.width, height: tag.height }}
-          data-port={tag.ports.length === 1 ? innerPort(layout.level, tag.ports[0]!) : undefined}
+          data-port={tag.ports.length === 1 ? innerPort(level, tag.ports[0]!) : undefined}
           data-kind={tag.kind}
           onPointerEnter={() => setLit(tag.ports)}
           onPointerLeave={() => setLit([])}
@@ -30,5 +31,5 @@ export function Tags({ layout }: { layout: LayoutRecord }) {
 
 function innerPort(level: string, port: string): string {
   if (level === "") return port;
-  return port.includes(".") ? port : `${joined("", level)}.${port}.inner`;
+  return port.includes(".") ? port : `${level}.${port}.inner`;
 }

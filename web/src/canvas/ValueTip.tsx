@@ -17,7 +17,7 @@ export function ValueTip() {
     setValue(null);
     setWhy("");
     if (path === null) return;
-    const subscription = socket.subscribe("value", { path }, 4, (next) => setValue(next as Value), setWhy);
+    const subscription = socket.subscribe("value", { path }, 4, (next, time) => setValue({ ...(next as Value), time }), setWhy);
     const key = (event: KeyboardEvent) => {
       if (event.key.toLowerCase() === "p" && !event.ctrlKey && !(event.target instanceof HTMLInputElement)) {
         event.stopImmediatePropagation();

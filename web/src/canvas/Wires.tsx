@@ -70,10 +70,10 @@ const Wire = memo(function Wire({ line, hot, picked, off, plain }: WireProps) {
           {(plain || pointsDown(line.points)) && !bundle && <path className={plain ? "tip sync" : "tip d"} d={tipOf(line.points)} />}
         </>
       )}
-      {(line.combs ?? []).map((comb) => (
+      {line.combs.map((comb) => (
         <path key={comb.join()} className={`wire thin ${line.kind === "signal" ? "sig" : "data"}`} d={rounded(comb, 0)} />
       ))}
-      {(line.dots ?? []).map((dot) => (
+      {line.dots.map((dot) => (
         <circle key={dot.join()} className={joint} cx={dot[0]} cy={dot[1]} r={line.is_active ? 4 : 3} />
       ))}
       {line.count_at && bundle && <Count at={line.count_at} count={line.edges.length} />}

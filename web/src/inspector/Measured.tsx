@@ -9,6 +9,7 @@ import { counted, duration } from "../ui/words";
 export function Measured({ path }: { path: string }) {
   const [facts, setFacts] = useState<NodeMeasures | null>(null);
   const canvas = useRef<HTMLCanvasElement>(null);
+  const isSubgraph = useStudio((s) => s.tables.nodes[path]?.subgraph ?? false);
   const runs = useStudio((s) => s.tables.studio.run?.state !== "rest");
 
   useEffect(() => {
@@ -21,7 +22,7 @@ export function Measured({ path }: { path: string }) {
     };
   }, [path]);
 
-  if (!runs) return null;
+  if (!runs || isSubgraph) return null;
   const waits = Object.entries(facts?.waiting ?? {}).sort((a, b) => b[1] - a[1])[0];
   return (
     <div className="sec">

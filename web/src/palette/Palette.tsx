@@ -80,7 +80,7 @@ function PaletteAtPlace({ at }: { at: PaletteAt }) {
           )}
         </div>
         <Rows found={found} words={words} index={index} choose={setIndex} add={(one) => add(one, true)} />
-        <div className="doc" tabIndex={-1}>
+        <div className="doc" tabIndex={0} role="region" aria-label="About the node type">
           {row && <NodeTypeDoc row={row} port={port} />}
         </div>
         <div className="ft">

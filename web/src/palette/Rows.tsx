@@ -1,4 +1,4 @@
-import { useEffect, useRef } from "react";
+import { useEffect, useRef, useState } from "react";
 import type { Found, FoundRow } from "../protocol/types";
 
 interface Props {
@@ -15,6 +15,7 @@ export function Rows({ found, words, index, choose, add }: Props) {
   useEffect(() => {
     list.current?.querySelector(".sel")?.scrollIntoView({ block: "nearest" });
   }, [index]);
+  const slow = useSlow(found === null);
   const rows = found?.rows ?? [];
   if (found && rows.length === 0) {
     return (
@@ -28,6 +29,11 @@ export function Rows({ found, words, index, choose, add }: Props) {
   const firstRefused = rows.findIndex((row) => row.fit === "refused");
   return (
     <ul id="palette-rows" role="listbox" aria-label="Node types" ref={list}>
+      {slow && (
+        <li className="hd" role="option" aria-selected="false">
+          Reading the catalogue of node types
+        </li>
+      )}
       {rows.map((row, at) => (
         <li
           key={row.reference + row.port}
@@ -47,6 +53,18 @@ export function Rows({ found, words, index, choose, add }: Props) {
       ))}
     </ul>
   );
+}
+
+/** Whether something takes longer than one would notice. */
+function useSlow(waits: boolean): boolean {
+  const [slow, setSlow] = useState(false);
+  useEffect(() => {
+    setSlow(false);
+    if (!waits) return;
+    const timer = setTimeout(() => setSlow(true), 300);
+    return () => clearTimeout(timer);
+  }, [waits]);
+  return slow && waits;
 }
 
 function Marked({ text, words }: { text: string; words: string }) {

@@ -6,27 +6,28 @@ import { CARD_PICTURES } from "./pictures";
 
 interface Start {
   folder: string;
-  examples: { name: string; path: string; title: string; text: string; nodes: number; picture?: string }[];
-  recent: { name: string; path: string }[];
-  runs: { name: string; path?: string }[];
+  files: { name: string; kind: string; changed: number }[];
+  runs: string[];
 }
 
+const MOST_CARDS = 12;
+
+/** Nothing is open: what can be opened here, and an empty graph. */
 export function StartPage() {
   const folder = useStudio((s) => s.tables.studio.file?.folder ?? "");
-  const [start, setStart] = useState<Start | null>(null);
+  const [start, setStart] = useState<Start>({ folder: "", files: [], runs: [] });
   useEffect(() => {
-    question<Start>("start", {}).then(setStart, () => setStart({ folder: "", examples: [], recent: [], runs: [] }));
+    question<Start>("start", {}).then(setStart, () => undefined);
   }, []);
-  const open = (path: string) => void ask({ t: "open", path, discard: false });
-  const [first, ...others] = start?.examples ?? [];
+  const files = [...start.files].sort((a, b) => b.changed - a.changed).slice(0, MOST_CARDS);
   return (
     <main className="start">
       <div className="in">
         <div style={{ display: "flex", alignItems: "flex-end", gap: 24, marginBottom: 24 }}>
           <div>
-            <h1 style={{ font: "600 24px/32px var(--font)", margin: 0 }}>Open a graph, or see one run</h1>
+            <h1 style={{ font: "600 24px/32px var(--font)", margin: 0 }}>Open a graph, or begin one</h1>
             <p style={{ marginTop: 4, fontSize: 13, lineHeight: "20px", color: "var(--ink2)" }}>
-              Files come from <b>{start?.folder || folder}</b>. Nothing leaves this machine.
+              Files come from <b>{start.folder || folder}</b>. Nothing leaves this machine.
             </p>
           </div>
           <span className="spring" />
@@ -34,57 +35,35 @@ export function StartPage() {
             <Icon name="file" />
             Open a file <kbd>Ctrl O</kbd>
           </button>
-          <button type="button" className="btn primary" style={{ height: 32 }} onClick={() => change({ popover: "open" })}>
+          <button type="button" className="btn primary" style={{ height: 32 }} onClick={() => change({ begun: true })}>
             <Icon name="plus" />
             New graph
           </button>
         </div>
-        {first && (
-          <button type="button" className="card wide-card" onClick={() => open(first.path)}>
-            <span className="pic">{CARD_PICTURES[0]}</span>
-            <span className="tx">
-              <b style={{ fontSize: 17, lineHeight: "24px" }}>{first.title}</b>
-              <p style={{ fontSize: 13, lineHeight: "20px" }}>{first.text}</p>
-              <small>{first.nodes} nodes</small>
-            </span>
-          </button>
-        )}
-        <h2 className="start-head">Start from something small</h2>
+        <h2 className="start-head">In this folder</h2>
+        {files.length === 0 && <p className="second">No graph files yet. What you save appears here.</p>}
         <div className="cards">
-          {others.map((one, index) => (
-            <button type="button" className="card" key={one.path} onClick={() => open(one.path)}>
-              <span className="pic">{CARD_PICTURES[(index % (CARD_PICTURES.length - 1)) + 1]}</span>
+          {files.map((one, index) => (
+            <button type="button" className="card" key={one.name} onClick={() => void ask({ t: "open", path: one.name, discard: false })}>
+              <span className="pic">{CARD_PICTURES[index % CARD_PICTURES.length]}</span>
               <span className="tx">
-                <b>{one.title}</b>
-                <p>{one.text}</p>
-                <small>
-                  {one.name} · {one.nodes} nodes
-                </small>
+                <b>{one.name}</b>
+                <p>{one.kind === "yaml" ? "graph file" : one.kind}</p>
               </span>
             </button>
           ))}
         </div>
-        <div style={{ display: "grid", gridTemplateColumns: "1fr 1fr", gap: 32, marginTop: 32 }}>
-          <div>
-            <h2 className="start-head">Opened before</h2>
-            {start?.recent.length ? start.recent.map((one) => <Link key={one.path} name={one.name} act={() => open(one.path)} />) : <p className="second">Nothing yet. Graphs that you open appear here.</p>}
-          </div>
-          <div>
-            <h2 className="start-head">Runs on this machine</h2>
-            {start?.runs.length ? start.runs.map((one) => <p key={one.name}>{one.name}</p>) : <p className="second">None. A graph that was started by <span className="mono">hfg run</span> appears here.</p>}
-          </div>
-        </div>
+        <h2 className="start-head" style={{ marginTop: 32 }}>
+          Runs on this machine
+        </h2>
+        {start.runs.length === 0 ? (
+          <p className="second">
+            None. A graph that was started by <span className="mono">hfg run</span> appears here.
+          </p>
+        ) : (
+          start.runs.map((name) => <p key={name}>{name}</p>)
+        )}
       </div>
     </main>
-  );
-}
-
-function Link({ name, act }: { name: string; act: () => void }) {
-  return (
-    <p>
-      <button type="button" className="btn" onClick={act}>
-        {name}
-      </button>
-    </p>
   );
 }

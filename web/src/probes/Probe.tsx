@@ -11,7 +11,7 @@ import { Plot } from "./Plot";
 export function Probe({ path }: { path: string }) {
   const [value, setValue] = useState<Value | null>(null);
   const [why, setWhy] = useState("");
-  useEffect(() => socket.subscribe("value", { path }, 4, (next) => setValue(next as Value), setWhy).end, [path]);
+  useEffect(() => socket.subscribe("value", { path }, 4, (next, time) => setValue({ ...(next as Value), time }), setWhy).end, [path]);
   const shape = value?.shape ? ` · ${[...value.shape].join("×")}` : "";
   return (
     <section className="probe" aria-label={`Probe of ${path}`}>

@@ -170,7 +170,6 @@ export interface LayoutLine {
 }
 
 export interface LayoutRecord {
-  level: string;
   title: string;
   view: "activity" | "mission" | "all";
   width: number;
@@ -179,7 +178,6 @@ export interface LayoutRecord {
   lines: LayoutLine[];
   groups: string[];
   hidden: number;
-  fixed?: string[];
 }
 
 export interface ProblemRecord {
@@ -326,6 +324,7 @@ export interface Found {
 }
 
 export interface Value {
+  /** When it was seen, in seconds of the run: that of its frame. */
   time: number;
   stamp: number | null;
   number: number;
@@ -334,7 +333,7 @@ export interface Value {
   summary: string;
   data: Data;
   shape: number[] | null;
-  dtype: string;
+  dtype: string | null;
   rate_hz: number;
   seen: number;
   message: string;

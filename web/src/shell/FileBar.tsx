@@ -16,9 +16,7 @@ export function FileBar() {
     return (
       <div className="bar-above" role="alert">
         <Icon name="error" />
-        <p>
-          {file.elsewhere} Yours has {file.changes === 1 ? "1 change" : `${file.changes} changes`}.
-        </p>
+        <p>{file.elsewhere}</p>
         <button type="button" className="btn line" onClick={() => void tell("save", { path: "", force: true })}>
           Keep mine
         </button>

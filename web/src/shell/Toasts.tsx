@@ -1,5 +1,6 @@
 import { dropToast } from "../state/actions";
 import { socket } from "../state/link";
+import { elapsed } from "../state/looking";
 import { useStudio, type Toast } from "../state/studio";
 import { Icon } from "../ui/Icon";
 import { moment } from "../ui/words";
@@ -47,6 +48,7 @@ function Away() {
   const phase = useStudio((s) => s.phase);
   const why = useStudio((s) => s.closedWhy);
   const run = useStudio((s) => s.tables.studio.run);
+  const offset = useStudio((s) => s.clockOffset);
   if (phase === "refused") {
     return (
       <div className="pop toast bad" role="alert">
@@ -66,7 +68,7 @@ function Away() {
         <Icon name="error" />
       </span>
       <span>
-        <b>No word from the studio for {seconds} s.</b> {run ? `You see how it was at ${moment(run.elapsed_s)}. ` : ""}Edits wait until it answers.
+        <b>No word from the studio for {seconds} s.</b> {run ? `You see how it was at ${moment(Math.max(0, elapsed(run, offset) - seconds))}. ` : ""}Edits wait until it answers.
       </span>
       <button type="button" className="btn line" onClick={() => socket.connect()}>
         Try now

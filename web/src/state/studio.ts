@@ -70,7 +70,8 @@ export interface Studio {
   pins: readonly string[];
   toasts: readonly Toast[];
   announced: string;
-  editedAt: string | null;
+  /** Whether the person has begun with an empty graph. */
+  begun: boolean;
 }
 
 const media = window.matchMedia("(prefers-color-scheme: dark)");
@@ -110,7 +111,7 @@ export const useStudio = create<Studio>()(() => ({
   pins: [],
   toasts: [],
   announced: "",
-  editedAt: null,
+  begun: false,
 }));
 
 export const studio = useStudio.getState;

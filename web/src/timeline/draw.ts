@@ -124,7 +124,7 @@ class Drawing {
       const x = Math.round(this.x(index * step));
       this.c.fillStyle = colour("line");
       this.c.fillRect(x, TOP, 1, this.height - TOP);
-      if (index % 2 === 0 && index >= 0) this.text(`${(index * step).toFixed(places)} s`, x + 4, 34, "ink3");
+      if (index % 2 === 0 && index >= 0 && x < this.width - 40) this.text(`${(index * step).toFixed(places)} s`, x + 4, 34, "ink3");
     }
   }
 
