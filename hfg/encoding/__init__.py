@@ -2,6 +2,9 @@
 
     data         any value as YAML and JSON hold it, and back by its declared type; used by parameters and files
     codecs       how the values of a type are composed, compiled once per type
+    carriers     what a codec consists of
+    standard     how classes of the standard library are carried
+    records      classes with fields
     arrays       which arrays travel as raw bytes
     descriptions what two ends compare before the first value
     plain        JSON from an unknown source, within bounds

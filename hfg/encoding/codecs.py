@@ -6,19 +6,18 @@ arrays. Numbers and strings are leaves, which cost only a check of their class. 
 declared type, so a value arrives with that type or is refused. The data names no classes: both ends have the type.
 
 A value arrives with the class that it was sent with, or it is not sent; its class is never guessed. Where a type allows
-several classes (a union, a Sequence), the number of the actual one is sent, too. Depends on `arrays` and types.
+several classes (a union, a Sequence), the number of the actual one is sent, too. Depends on `carriers`,
+`standard`, `records`, `arrays` and types.
 """
 
 from __future__ import annotations
 
 import collections
 import dataclasses
-import datetime
 import decimal
 import enum
 import fractions
 import functools
-import inspect
 import json
 import numbers
 import operator
@@ -26,56 +25,39 @@ import os
 import pathlib
 import types
 import typing
-import uuid
-import zoneinfo
 from collections import abc
-from collections.abc import Callable, Iterable, Sequence
-from typing import Annotated, Any, Final, Literal, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
 import numpy as np
 
 from hfg.encoding.arrays import array_problem, unsafe_content
+from hfg.encoding.carriers import (
+    Arrays,
+    Codec,
+    Later,
+    Unfit,
+    each,
+    each_pair,
+    generic,
+    leaf,
+    lift_parts,
+    lower_parts,
+    optional,
+    tagged,
+    unchanged,
+)
+from hfg.encoding.records import filled, giver, maker, names_of, required_keys
+from hfg.encoding.standard import CARRIED, NATIVE, Carried
 from hfg.errors import EncodingError
 from hfg.types import accepts, array_facts, bare_type, describe, describe_value
 
-__all__ = ["Codec", "Unfit", "codec_for", "wire_problem"]
+__all__ = ["codec_for", "wire_problem"]
 
-Arrays = list["np.ndarray[Any, Any]"]
-Lower = Callable[[Any, Arrays], Any]
-"""Returns the carrier of a value, and adds its arrays to those of the frame."""
-Lift = Callable[[Any, Arrays], Any]
-"""Returns the value that is carried."""
 
 _NONE: Final = type(None)
 _LONGEST_NUMBER: Final = 2**16  # bytes of an integer beyond 64 bits: arithmetic on longer ones takes too long
-_REMEMBERED: Final = 64
-
-
-class Unfit(Exception):
-    """A value does not exactly match its type; `where` grows while the error travels out of the value."""
-
-    def __init__(self, value: Any, hint: Any, why: str = "") -> None:
-        super().__init__()
-        self.value = value
-        self.hint = hint
-        self.why = why
-        self.where = ""
-
-    def inside(self, place: str) -> Unfit:
-        """Add the part of a value in which the error occurred."""
-        self.where = place + self.where
-        return self
-
-    def sentence(self, what: str) -> str:
-        """Return the message for the sender."""
-        found = f"expected {describe(self.hint)}, found {describe_value(self.value)}"
-        why = self.why or (
-            "it would arrive as another class: send exactly the declared one"
-            if accepts(self.value, self.hint)
-            else "send what the port declares, or declare what it sends"
-        )
-        return f"{what}{self.where} cannot be sent: {found}; {why}"
 
 
 class _CannotCross(Exception):
@@ -94,26 +76,6 @@ class _CannotCross(Exception):
         if self.where is not None:
             return f"{where}: its part {self.where} is {part}, which {self.why}"
         return f"{where}: {part if part != describe(whole) else 'it'} {self.why}"
-
-
-class Codec(NamedTuple):
-    """Converts the values of one type.
-
-    Attributes:
-      hint: the type.
-      form: plain data with everything that two ends must agree on.
-      wire: the type that carries it, which msgspec writes and reads.
-      exact: classes whose values are their own carrier; empty unless the type is a leaf.
-      lower: checks a value and returns its carrier.
-      lift: returns the value of a carrier; None if they are the same.
-    """
-
-    hint: Any
-    form: Any
-    wire: Any
-    exact: frozenset[type]
-    lower: Lower
-    lift: Lift | None
 
 
 def codec_for(hint: Any, *, wide: bool = False) -> Codec:
@@ -162,64 +124,6 @@ def wire_problem(hint: Any) -> str | None:
     return None
 
 
-# --- what stands for what ---
-
-
-class _Carried(NamedTuple):
-    """A class that hfg knows, whose values are carried by values of a type."""
-
-    by: Any
-    lower: Callable[[Any], Any]
-    lift: Callable[[Any], Any]
-
-
-def _zone_of(value: datetime.datetime) -> tuple[str, str | None]:
-    zone = value.tzinfo
-    if isinstance(zone, zoneinfo.ZoneInfo) and zone.key:
-        return f"{value.fold}{value.replace(tzinfo=None).isoformat()}", zone.key
-    if zone is not None and type(zone) is not datetime.timezone:
-        raise ValueError("its time zone has no name; use datetime.timezone or zoneinfo.ZoneInfo")
-    return f"{value.fold}{value.isoformat()}", None
-
-
-def _in_zone(data: tuple[str, str | None]) -> datetime.datetime:
-    text, key = data
-    value = datetime.datetime.fromisoformat(text[1:]).replace(fold=int(text[:1]))
-    return value if key is None else value.replace(tzinfo=zoneinfo.ZoneInfo(key))
-
-
-def _time_text(value: datetime.time) -> str:
-    if value.tzinfo is not None and type(value.tzinfo) is not datetime.timezone:
-        raise ValueError("its time zone has no fixed offset")
-    return f"{value.fold}{value.isoformat()}"
-
-
-def _fraction(data: tuple[int, int]) -> fractions.Fraction:
-    made = fractions.Fraction(*data)
-    if (made.numerator, made.denominator) != data:
-        raise ValueError("a fraction is not in lowest terms")
-    return made
-
-
-_NATIVE: Final = (bool, str, bytes, bytearray, decimal.Decimal, uuid.UUID, datetime.date)
-"""Leaves that msgspec writes and reads without loss."""
-
-_CARRIED: Final[dict[type, _Carried]] = {
-    fractions.Fraction: _Carried(tuple[int, int], fractions.Fraction.as_integer_ratio, _fraction),
-    range: _Carried(
-        tuple[int, int, int], lambda value: (value.start, value.stop, value.step), lambda data: range(*data)
-    ),
-    datetime.datetime: _Carried(tuple[str, str | None], _zone_of, _in_zone),
-    datetime.time: _Carried(
-        str, _time_text, lambda data: datetime.time.fromisoformat(data[1:]).replace(fold=int(data[:1]))
-    ),
-    datetime.timedelta: _Carried(
-        tuple[int, int, int],
-        lambda value: (value.days, value.seconds, value.microseconds),
-        lambda data: datetime.timedelta(*data),
-    ),
-}
-
 _CODE: Final = "is code, and code cannot be sent; send data that describes what to do"
 _NO_DATA: Final = (
     "is not data that hfg can send; use numbers, strings, arrays, enums, dataclasses, structs, named tuples, "
@@ -251,7 +155,7 @@ class _Compiler:
 
     def __init__(self, wide: bool) -> None:
         self._wide = wide
-        self._under_way: dict[Any, _Later] = {}
+        self._under_way: dict[Any, Later] = {}
 
     def compile(self, hint: Any) -> Codec:
         bare = bare_type(hint)
@@ -288,7 +192,7 @@ class _Compiler:
         later = self._under_way.get(hint)
         if later is not None:
             return later.codec
-        self._under_way[hint] = later = _Later(hint, cls.__name__)
+        self._under_way[hint] = later = Later(hint, cls.__name__)
         try:
             made = self._keyed(hint, fields) if typing.is_typeddict(cls) else self._record(hint, cls, fields)
         finally:
@@ -302,14 +206,14 @@ class _Compiler:
         if cls in (int, float):
             return self._number(cls)
         if cls is _NONE:
-            return _leaf(None, "None", None, _NONE)
-        if cls in _NATIVE:
-            return _leaf(cls, cls.__name__, cls, cls)
+            return leaf(None, "None", None, _NONE)
+        if cls in NATIVE:
+            return leaf(cls, cls.__name__, cls, cls)
         if cls is complex:
-            parts = _Carried(tuple[float, float], _parts_of_complex, lambda data: complex(*data))
+            parts = Carried(tuple[float, float], _parts_of_complex, lambda data: complex(*data))
             return self._union(complex, [self._carried(complex, parts), self._number(float)])
-        if cls in _CARRIED:
-            return self._carried(cls, _CARRIED[cls])
+        if cls in CARRIED:
+            return self._carried(cls, CARRIED[cls])
         if issubclass(cls, enum.Enum):
             return self._enum(cls)
         if cls is os.PathLike or issubclass(cls, pathlib.PurePath):
@@ -322,7 +226,7 @@ class _Compiler:
         """Return the codec of integers, which any number type accepts (PEP 484); beyond 64 bits they are bytes."""
         exact = frozenset({int, bool} if cls is int else {float, int, bool})
         if not self._wide:
-            return _leaf(cls, cls.__name__, int | bool if cls is int else float | int | bool, *exact)
+            return leaf(cls, cls.__name__, int | bool if cls is int else float | int | bool, *exact)
 
         def lower(value: Any, arrays: Arrays) -> Any:
             if isinstance(value, np.generic):
@@ -343,7 +247,7 @@ class _Compiler:
         wire: Any = bytes | bool if cls is int else bytes | bool | float
         return Codec(cls, [cls.__name__], wire, frozenset(), lower, lift)
 
-    def _carried(self, cls: type, how: _Carried, name: str | None = None) -> Codec:
+    def _carried(self, cls: type, how: Carried, name: str | None = None) -> Codec:
         inner = self.compile(how.by)
         give, make, lower_inner, lift_inner = how.lower, how.lift, inner.lower, inner.lift
 
@@ -362,7 +266,7 @@ class _Compiler:
 
     def _enum(self, cls: Any) -> Codec:
         if issubclass(cls, enum.Flag):
-            made = self._carried(cls, _Carried(int, lambda value: value.value, cls))
+            made = self._carried(cls, Carried(int, lambda value: value.value, cls))
             return made._replace(form=["flag", cls.__name__, [[one.name, one.value] for one in cls]])
         members = list(cls)
         return self._chosen(cls, members, ["enum", cls.__name__, [one.name for one in members]], {cls})
@@ -391,10 +295,10 @@ class _Compiler:
         return Codec(hint, form, wire, frozenset(), lower, lambda data, arrays: members[data])
 
     def _path(self, hint: Any, cls: Any) -> Codec:
-        text = _Carried(str, str, cls)
+        text = Carried(str, str, cls)
         concrete = [one for one in _PATHS if issubclass(one, cls)] if cls is not os.PathLike else list(_PATHS)
         if cls is pathlib.Path:  # a path of this system, whichever that is
-            return self._carried(type(pathlib.Path()), _Carried(str, str, pathlib.Path), "Path")
+            return self._carried(type(pathlib.Path()), Carried(str, str, pathlib.Path), "Path")
         if cls in (pathlib.PurePath, os.PathLike):
             return self._union(hint, [self.compile(one) for one in concrete])
         return self._carried(cls, text)
@@ -465,10 +369,10 @@ class _Compiler:
         if all(member.exact and member.exact <= _TOLD_APART for member in others) and not {str, bytes} <= exact:
             wire = functools.reduce(operator.or_, (member.wire for member in others), None) if nothing else None
             wire = wire or functools.reduce(operator.or_, (member.wire for member in others))
-            return _leaf(hint, form, wire, *exact)
+            return leaf(hint, form, wire, *exact)
         if len(others) == 1:
-            return _optional(hint, form, others[0])
-        return _tagged(hint, form, others, bool(nothing))
+            return optional(hint, form, others[0])
+        return tagged(hint, form, others, bool(nothing))
 
     def _container(self, hint: Any, cls: type, arguments: tuple[Any, ...]) -> Codec | None:
         if cls is tuple:
@@ -483,7 +387,7 @@ class _Compiler:
             return self._sequence(hint, cls, self._part(hint, arguments, 0))
         if cls in _SETS:
             part = self._part(hint, arguments, 0)
-            return self._union(hint, [self._items(_generic(one, part.hint), one, part) for one in (set, frozenset)])
+            return self._union(hint, [self._items(generic(one, part.hint), one, part) for one in (set, frozenset)])
         if cls in _MAPPINGS:
             key, item = self._part(hint, arguments, 0), self._part(hint, arguments, 1)
             return self._pairs(hint, dict, key, item)
@@ -497,12 +401,12 @@ class _Compiler:
     def _sequence(self, hint: Any, cls: type, part: Codec) -> Codec:
         item = part.hint
         members = [
-            self._items(_generic(list, item), list, part),
-            self._items(_generic(tuple, item, ...), tuple, part),
-            self._items(_generic(collections.deque, item), collections.deque, part),
+            self._items(generic(list, item), list, part),
+            self._items(generic(tuple, item, ...), tuple, part),
+            self._items(generic(collections.deque, item), collections.deque, part),
         ]
         if cls not in (abc.Sequence, abc.MutableSequence, abc.Reversible):
-            members += [self._items(_generic(one, item), one, part) for one in (set, frozenset)]
+            members += [self._items(generic(one, item), one, part) for one in (set, frozenset)]
         if bare_type(item) is str:
             members.append(self.compile(str))
         if bare_type(item) is int:
@@ -517,12 +421,12 @@ class _Compiler:
                 raise Unfit(value, hint)
             if exact and exact.issuperset(map(type, value)):
                 return value
-            return _each(value, lower_part, arrays)
+            return each(value, lower_part, arrays)
 
         def lower_deque(value: Any, arrays: Arrays) -> Any:
             if type(value) is not cls:
                 raise Unfit(value, hint)
-            return value.maxlen, _each(value, lower_part, arrays)
+            return value.maxlen, each(value, lower_part, arrays)
 
         def lift(data: Any, arrays: Arrays) -> Any:
             return cls(data if lift_part is None else [lift_part(one, arrays) for one in data])
@@ -535,12 +439,12 @@ class _Compiler:
 
         form = [cls.__name__, part.form]
         if cls is collections.deque:
-            wire = _generic(tuple, int | None, _generic(list, part.wire))
+            wire = generic(tuple, int | None, generic(list, part.wire))
             return Codec(hint, form, wire, frozenset(), lower_deque, lift_deque)
         if exact:  # msgspec makes the container itself
-            wire = _generic(tuple, part.wire, ...) if cls is tuple else _generic(cls, part.wire)
+            wire = generic(tuple, part.wire, ...) if cls is tuple else generic(cls, part.wire)
             return Codec(hint, form, wire, frozenset(), lower, None)
-        return Codec(hint, form, _generic(list, part.wire), frozenset(), lower, lift)
+        return Codec(hint, form, generic(list, part.wire), frozenset(), lower, lift)
 
     def _tuple(self, hint: Any, arguments: tuple[Any, ...]) -> Codec:
         if len(arguments) == 2 and arguments[1] is ...:
@@ -552,12 +456,12 @@ class _Compiler:
         def lower(value: Any, arrays: Arrays) -> Any:
             if type(value) is not tuple or len(value) != len(parts):
                 raise Unfit(value, hint)
-            return lower_parts(value, arrays)
+            return lowered(value, arrays)
 
-        lower_parts = _lower_parts(parts, [f"[{number}]" for number in range(len(parts))])
-        lift_parts = _lift_parts(parts)
-        wire = _generic(tuple, *[part.wire for part in parts])
-        lift = None if lift_parts is None else lambda data, arrays: tuple(lift_parts(data, arrays))
+        lowered = lower_parts(parts, [f"[{number}]" for number in range(len(parts))])
+        lifted = lift_parts(parts)
+        wire = generic(tuple, *[part.wire for part in parts])
+        lift = None if lifted is None else lambda data, arrays: tuple(lifted(data, arrays))
         return Codec(hint, ["tuple", [part.form for part in parts]], wire, frozenset(), lower, lift)
 
     def _pairs(self, hint: Any, cls: type, key: Codec, item: Codec) -> Codec:
@@ -569,21 +473,21 @@ class _Compiler:
                     raise Unfit(value, hint)
                 if key.exact.issuperset(map(type, value)) and item.exact.issuperset(map(type, value.values())):
                     return value
-                return dict(_each_pair(value, key.lower, item.lower, arrays))
+                return dict(each_pair(value, key.lower, item.lower, arrays))
 
-            return Codec(hint, form, _generic(dict, key.wire, item.wire), frozenset(), lower_plain, None)
+            return Codec(hint, form, generic(dict, key.wire, item.wire), frozenset(), lower_plain, None)
 
         def lower(value: Any, arrays: Arrays) -> Any:
             if type(value) is not cls:
                 raise Unfit(value, hint)
-            return _each_pair(value, key.lower, item.lower, arrays)
+            return each_pair(value, key.lower, item.lower, arrays)
 
-        lift_key, lift_item = key.lift or _as_it_is, item.lift or _as_it_is
+        lift_key, lift_item = key.lift or unchanged, item.lift or unchanged
 
         def lift(data: Any, arrays: Arrays) -> Any:
             return make([(lift_key(one, arrays), lift_item(other, arrays)) for one, other in data])
 
-        wire = _generic(list, _generic(tuple, key.wire, item.wire))
+        wire = generic(list, generic(tuple, key.wire, item.wire))
         return Codec(hint, form, wire, frozenset(), lower, lift)
 
     # --- classes with fields ---
@@ -597,9 +501,9 @@ class _Compiler:
 
     def _record(self, hint: Any, cls: Any, fields: dict[str, Any]) -> Codec:
         parts = [self._field(cls, name, one) for name, one in fields.items()]
-        give, make = _giver(cls, tuple(fields)), _maker(cls, tuple(fields))
-        lower_parts = _lower_parts(parts, [f".{name}" for name in fields])
-        lift_parts = _lift_parts(parts)
+        give, make = giver(cls, tuple(fields)), maker(cls, tuple(fields))
+        lowered = lower_parts(parts, [f".{name}" for name in fields])
+        lifted = lift_parts(parts)
 
         def lower(value: Any, arrays: Arrays) -> Any:
             if type(value) is not cls:
@@ -608,30 +512,30 @@ class _Compiler:
                 items = give(value)
             except AttributeError as error:
                 raise Unfit(value, hint, str(error)) from None
-            return lower_parts(items, arrays)
+            return lowered(items, arrays)
 
         def lift(data: Any, arrays: Arrays) -> Any:
-            if lift_parts is not None:
-                data = lift_parts(data, arrays)
+            if lifted is not None:
+                data = lifted(data, arrays)
             try:
                 return make(data)
             except Exception as error:  # classes of users check their fields and may raise anything
                 raise ValueError(f"it is not {cls.__name__} ({type(error).__name__}: {error})") from error
 
         form = ["class", cls.__name__, [[name, part.form] for name, part in zip(fields, parts, strict=True)]]
-        wire = _generic(tuple, *[part.wire for part in parts])
+        wire = generic(tuple, *[part.wire for part in parts])
         return Codec(hint, form, wire, frozenset(), lower, lift)
 
     def _keyed(self, hint: Any, fields: dict[str, Any]) -> Codec:
         """Return the codec of a dict with known keys; each is a list of one value, empty if the key is missing."""
         parts = {name: self._field(hint, name, one) for name, one in fields.items()}
-        required = _required_keys(hint)
+        required = required_keys(hint)
 
         def lower(value: Any, arrays: Arrays) -> Any:
             if type(value) is not dict or not required <= value.keys() <= parts.keys():
                 raise Unfit(value, hint)
             return [
-                _each([value[name]], part.lower, arrays, f'["{name}"]') if name in value else ()
+                each([value[name]], part.lower, arrays, f'["{name}"]') if name in value else ()
                 for name, part in parts.items()
             ]
 
@@ -645,7 +549,7 @@ class _Compiler:
             return made
 
         form = ["dict", hint.__name__, [[name, part.form, name in required] for name, part in parts.items()]]
-        wire = _generic(tuple, *[_generic(list, part.wire) for part in parts.values()])
+        wire = generic(tuple, *[generic(list, part.wire) for part in parts.values()])
         return Codec(hint, form, wire, frozenset(), lower, lift)
 
 
@@ -656,177 +560,14 @@ _KEYS: Final = frozenset({bool, int, str})
 """Classes of keys that msgspec writes directly."""
 
 
-class _Later:
-    """The codec of a recursive type while it is made: its carrier is read in a second step."""
-
-    def __init__(self, hint: Any, name: str) -> None:
-        self.made: Codec | None = None
-        self.codec = Codec(hint, ["again", name], Any, frozenset(), self._lower, self._lift)
-
-    def _lower(self, value: Any, arrays: Arrays) -> Any:
-        assert self.made is not None
-        return self.made.lower(value, arrays)
-
-    def _lift(self, data: Any, arrays: Arrays) -> Any:
-        assert self.made is not None
-        data = msgspec.convert(data, self.made.wire)
-        return data if self.made.lift is None else self.made.lift(data, arrays)
-
-
-def _generic(cls: Any, *parts: Any) -> Any:
-    return cls[parts]
-
-
-def _or_none(wire: Any) -> Any:
-    """Return the type of a carrier that may be None, too."""
-    return None if wire is None else wire | None
-
-
 def _parts_of_complex(value: complex) -> tuple[float, float]:
     return value.real, value.imag
 
 
-def _as_it_is(data: Any, arrays: Arrays) -> Any:
-    return data
-
-
-def _leaf(hint: Any, form: Any, wire: Any, *classes: type) -> Codec:
-    exact = frozenset(classes)
-
-    def lower(value: Any, arrays: Arrays) -> Any:
-        if type(value) in exact:
-            return value
-        if isinstance(value, np.generic):  # a numpy number is the same number
-            item = value.item()
-            if type(item) in exact:
-                return item
-        raise Unfit(value, hint)
-
-    return Codec(hint, [form] if isinstance(form, str) else form, wire, exact, lower, None)
-
-
-def _optional(hint: Any, form: Any, other: Codec) -> Codec:
-    lower_other, lift_other = other.lower, other.lift
-
-    def lower(value: Any, arrays: Arrays) -> Any:
-        return None if value is None else lower_other(value, arrays)
-
-    def lift(data: Any, arrays: Arrays) -> Any:
-        return None if data is None or lift_other is None else lift_other(data, arrays)
-
-    return Codec(hint, form, _or_none(other.wire), frozenset(), lower, None if lift_other is None else lift)
-
-
-def _tagged(hint: Any, form: Any, members: list[Codec], may_be_none: bool) -> Codec:
-    boxes: list[Any] = [
-        msgspec.defstruct(f"Box{number}", [("value", member.wire)], tag=number, array_like=True, frozen=True)
-        for number, member in enumerate(members)
-    ]
-    # for each class, the member that took its last value: most often it takes the next one, too
-    first: dict[type, int] = {}
-
-    def lower(value: Any, arrays: Arrays) -> Any:
-        if value is None and may_be_none:
-            return None
-        begin, kind = len(arrays), type(value)
-        likely = first.get(kind)
-        order: Iterable[int] = range(len(members))
-        for number in order if likely is None else (likely, *order):
-            try:
-                made = boxes[number](members[number].lower(value, arrays))
-            except Unfit:
-                del arrays[begin:]
-                continue
-            if len(first) < _REMEMBERED:
-                first[kind] = number
-            return made
-        raise Unfit(value, hint)
-
-    lifts = {box: member.lift for box, member in zip(boxes, members, strict=True)}
-
-    def lift(data: Any, arrays: Arrays) -> Any:
-        if data is None:
-            return None
-        inner = lifts[type(data)]
-        return data.value if inner is None else inner(data.value, arrays)
-
-    wire = functools.reduce(operator.or_, boxes)
-    return Codec(hint, form, wire | None if may_be_none else wire, frozenset(), lower, lift)
-
-
-def _each(values: Iterable[Any], lower: Lower, arrays: Arrays, place: str | None = None) -> list[Any]:
-    made: list[Any] = []
-    try:
-        for value in values:
-            made.append(lower(value, arrays))  # noqa: PERF401 - its length says which value did not fit
-    except Unfit as problem:
-        raise problem.inside(place or f"[{len(made)}]") from None
-    return made
-
-
-def _each_pair(value: Any, lower_key: Lower, lower_item: Lower, arrays: Arrays) -> list[tuple[Any, Any]]:
-    made, key = [], None
-    try:
-        for key, item in value.items():
-            made.append((lower_key(key, arrays), lower_item(item, arrays)))
-    except Unfit as problem:
-        raise problem.inside(f"[{key!r:.40}]") from None
-    return made
-
-
-def _lower_parts(parts: Sequence[Codec], places: Sequence[str]) -> Lower:
-    """Lower a tuple of values of different types.
-
-    A tuple of classes that was right for the leaves is right again, so one lookup checks all of them.
-    """
-    leaves = [number for number, part in enumerate(parts) if part.exact]
-    others = [(number, part.lower) for number, part in enumerate(parts) if not part.exact]
-    right: set[tuple[type, ...]] = set()
-
-    def lower(items: tuple[Any, ...], arrays: Arrays) -> Any:
-        kinds = tuple(map(type, items))
-        made: Any = items
-        number = 0
-        try:
-            if kinds not in right:
-                made = list(items)
-                for number in leaves:
-                    made[number] = parts[number].lower(items[number], arrays)
-                if len(right) < _REMEMBERED and all(map(operator.is_, made, items)):
-                    right.add(kinds)
-            elif others:
-                made = list(items)
-            for number, one in others:
-                made[number] = one(items[number], arrays)
-        except Unfit as problem:
-            raise problem.inside(places[number]) from None
-        return made
-
-    return lower
-
-
-def _lift_parts(parts: Sequence[Codec]) -> Callable[[Any, Arrays], list[Any]] | None:
-    if all(part.lift is None for part in parts):
-        return None
-    lifts = [(number, part.lift) for number, part in enumerate(parts) if part.lift is not None]
-
-    def lift(data: Any, arrays: Arrays) -> list[Any]:
-        made = list(data)
-        for number, one in lifts:
-            made[number] = one(made[number], arrays)
-        return made
-
-    return lift
-
-
-# --- classes with fields ---
-
-
 def _fields_of(cls: Any, arguments: tuple[Any, ...]) -> dict[str, Any] | None:
     """Return the fields of a class with their types; None if it has no fields."""
-    is_struct, is_data = issubclass(cls, msgspec.Struct), dataclasses.is_dataclass(cls)
-    is_named = issubclass(cls, tuple) and hasattr(cls, "_fields")
-    if not (is_struct or is_data or is_named or typing.is_typeddict(cls)):
+    names: Sequence[str] | None = names_of(cls)
+    if names is None and not typing.is_typeddict(cls):
         return None
     try:
         hints = typing.get_type_hints(cls, include_extras=True)
@@ -834,64 +575,7 @@ def _fields_of(cls: Any, arguments: tuple[Any, ...]) -> dict[str, Any] | None:
         raise _CannotCross(
             cls, f"has fields whose types cannot be resolved ({error}); import them at module level"
         ) from None
-    if is_struct:
-        names: Sequence[str] = cls.__struct_fields__
-    elif is_data:
-        if any(isinstance(one, dataclasses.InitVar) for one in hints.values()):
-            raise _CannotCross(cls, "takes arguments that it does not keep (InitVar), so it cannot be rebuilt")
-        names = [one.name for one in dataclasses.fields(cls)]
-    elif is_named:
-        names = cls._fields
-    else:
-        names = list(hints)
+    if dataclasses.is_dataclass(cls) and any(isinstance(one, dataclasses.InitVar) for one in hints.values()):
+        raise _CannotCross(cls, "takes arguments that it does not keep (InitVar), so it cannot be rebuilt")
     known = dict(zip(getattr(cls, "__parameters__", ()), arguments, strict=False))
-    return {name: _filled(hints.get(name, Any), known) for name in names}
-
-
-def _required_keys(cls: Any) -> frozenset[str]:
-    """Return the keys that are required. With quoted annotations, the class itself does not know them."""
-    hints = typing.get_type_hints(cls, include_extras=True)
-    marked = {name: typing.get_origin(hint) for name, hint in hints.items()}
-    required = {name for name in cls.__required_keys__ if marked.get(name) is not typing.NotRequired}
-    return frozenset(required | {name for name, mark in marked.items() if mark is typing.Required})
-
-
-def _filled(hint: Any, known: dict[Any, Any]) -> Any:
-    """Replace the parameters of a generic class in the type of a field."""
-    if isinstance(hint, typing.TypeVar):
-        return known.get(hint, hint)
-    unknown = getattr(hint, "__parameters__", ())
-    if known and unknown and typing.get_origin(hint) is not None:
-        return hint[tuple(known.get(one, one) for one in unknown)]
-    return hint
-
-
-def _giver(cls: Any, names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
-    if issubclass(cls, tuple):
-        return tuple
-    if not names:
-        return lambda value: ()
-    give = operator.attrgetter(*names)
-    return give if len(names) > 1 else lambda value: (give(value),)
-
-
-def _maker(cls: Any, names: tuple[str, ...]) -> Callable[[Any], Any]:
-    """Make an object from its fields by calling its class, so that its checks run and derived fields are computed."""
-    if issubclass(cls, tuple):
-        return lambda items: cls._make(items)
-    arguments = inspect.signature(cls).parameters
-    if tuple(arguments) == names and not any(one.kind is one.KEYWORD_ONLY for one in arguments.values()):
-        return lambda items: cls(*items)
-    if set(arguments) == set(names):
-        return lambda items: cls(**dict(zip(names, items, strict=True)))
-    finish = getattr(cls, "__post_init__", None)
-
-    def make(items: Sequence[Any]) -> Any:  # fields that the class computes itself, or a custom __init__
-        made = object.__new__(cls)
-        for name, item in zip(names, items, strict=True):
-            object.__setattr__(made, name, item)
-        if finish is not None:
-            finish(made)
-        return made
-
-    return make
+    return {name: filled(hints.get(name, Any), known) for name in (list(hints) if names is None else names)}

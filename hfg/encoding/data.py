@@ -12,7 +12,6 @@ from __future__ import annotations
 import ast
 import base64
 import binascii
-import dataclasses
 import datetime
 import decimal
 import enum
@@ -20,7 +19,6 @@ import importlib
 import json
 import math
 import os
-import sys
 import types
 import typing
 import uuid
@@ -33,6 +31,7 @@ import msgspec
 import numpy as np
 
 from hfg.base.values import Colour, Span, same
+from hfg.encoding.records import hints_of, imported, names_of
 from hfg.errors import EncodingError
 from hfg.types import accepts, bare_type, describe, describe_value
 
@@ -183,7 +182,7 @@ def reference_to(value: Any) -> str | None:
     module, name = getattr(value, "__module__", None), getattr(value, "__qualname__", None)
     if module is None and isinstance(name, str) and hasattr(value, "__name__"):  # functions of C libraries
         return None
-    if not isinstance(module, str) or not isinstance(name, str) or _found(module, name) is not value:
+    if not isinstance(module, str) or not isinstance(name, str) or imported(f"{module}:{name}") is not value:
         return None
     return f"{module}:{name}"
 
@@ -210,19 +209,11 @@ def _find_tagged(reference: str) -> Any:
 
 
 def _already_imported(reference: str) -> Any:
-    module, _, name = reference.partition(":")
-    found = _found(module, name)
+    found = imported(reference)
     if found is None:
+        module, _, name = reference.partition(":")
         raise EncodingError(f'"{reference}": module "{module}" has no "{name}"')
     return found
-
-
-def _found(module: str, name: str) -> Any:
-    first, *nested = name.split(".")
-    found: Any = getattr(sys.modules.get(module), first, None)
-    for part in nested:  # classes in classes, never names that the module has itself imported
-        found = getattr(found, part, None) if isinstance(found, type) else None
-    return None if isinstance(found, types.ModuleType) else found
 
 
 # --- from values ---
@@ -270,7 +261,7 @@ def _plain_object(value: Any, tagged: bool) -> Any:
         return _tag("complex", str(value), tagged)
     if isinstance(value, _TEXTS):
         return _tag_of(kind, msgspec.to_builtins(value), tagged)
-    fields = _fields_of(kind)
+    fields = names_of(kind, given=True)
     if fields is not None:
         return _tag_of(kind, {name: _plain(getattr(value, name), tagged) for name in fields}, tagged)
     if isinstance(value, type) or callable(value):
@@ -331,18 +322,6 @@ def _numbers(data: Any) -> Any:
     return data if math.isfinite(data) else _inexact(data)
 
 
-def _fields_of(kind: Any) -> tuple[str, ...] | None:
-    """Return the field names of a dataclass, struct or named tuple; None for other classes."""
-    if not isinstance(kind, type):
-        return None
-    if issubclass(kind, msgspec.Struct):
-        return kind.__struct_fields__
-    if dataclasses.is_dataclass(kind):
-        return tuple(one.name for one in dataclasses.fields(kind) if one.init)
-    names = getattr(kind, "_fields", None)
-    return names if issubclass(kind, tuple) and isinstance(names, tuple) else None
-
-
 # --- back to values ---
 
 
@@ -397,7 +376,7 @@ _TAGGED: Final[dict[str, Any]] = {
 
 def is_data_type(kind: Any) -> bool:
     """Return whether the values of a class consist only of data, so that reading one runs only its own checks."""
-    return isinstance(kind, type) and (issubclass(kind, (enum.Enum, *_TEXTS)) or _fields_of(kind) is not None)
+    return isinstance(kind, type) and (issubclass(kind, (enum.Enum, *_TEXTS)) or names_of(kind, given=True) is not None)
 
 
 def _array(data: dict[str, Any], where: str) -> Any:
@@ -571,7 +550,7 @@ class _Decoder:
             return typing.cast(Any, cls)(data)  # paths are made from strings
         if cls in (bytes, complex) and isinstance(data, str):
             return self.made_of_text(cls, data)
-        if _fields_of(cls) is not None:
+        if names_of(cls, given=True) is not None:
             return self.fields(data, cls)
         try:
             return msgspec.convert(data, cls)
@@ -614,7 +593,7 @@ class _Decoder:
             raise self.refuse(data) from None
 
     def fields(self, data: Any, cls: Any) -> Any:
-        names = _fields_of(cls) or ()
+        names = names_of(cls, given=True) or ()
         if _is_list(data) and issubclass(cls, tuple):
             data = dict(zip(names, data, strict=False)) if len(data) <= len(names) else None
         if not isinstance(data, dict):
@@ -624,10 +603,7 @@ class _Decoder:
             raise EncodingError(
                 f"{self.where} has no {unknown!r:.40}: {describe(cls)} has {', '.join(names) or 'nothing'}"
             )
-        try:
-            hints = typing.get_type_hints(cls, include_extras=True)
-        except Exception:  # names that exist only for type checkers
-            hints = {}
+        hints = hints_of(cls)
         values = {
             name: _decode(one, hints.get(name, Any), f"{self.where}.{name}", self.find) for name, one in data.items()
         }

@@ -20,7 +20,8 @@ import numpy as np
 
 from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.encoding.arrays import ArrayHead, Lease, bytes_of, view_of
-from hfg.encoding.codecs import Codec, Unfit, codec_for
+from hfg.encoding.carriers import Codec, Unfit
+from hfg.encoding.codecs import codec_for
 from hfg.errors import EncodingError
 
 __all__ = ["Limits", "Place", "TokenCodec", "View"]

@@ -1,19 +1,19 @@
 """The forms in which values of a type are written: the basis of encoding, decoding and the schemas of files.
 
-Does not depend on other modules of the recording.
+Depends on `records` of the encoding.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import enum
 import types
 import typing
 from collections import abc
 from typing import Annotated, Any, Final, Literal, NamedTuple
 
-import msgspec
 import numpy as np
+
+from hfg.encoding.records import hints_of, names_of
 
 __all__ = ["PLAIN_TYPES", "Form", "bare", "fields_of", "form_of", "is_plain", "reference"]
 
@@ -49,21 +49,9 @@ def reference(kind: type) -> str:
 
 def fields_of(kind: Any) -> dict[str, Any] | None:
     """Return the fields of a struct, dataclass or NamedTuple with their types; None for other classes."""
-    if not isinstance(kind, type):
-        return None
-    if issubclass(kind, msgspec.Struct):
-        names: tuple[str, ...] = kind.__struct_fields__
-    elif dataclasses.is_dataclass(kind):
-        names = tuple(one.name for one in dataclasses.fields(kind))
-    elif issubclass(kind, tuple) and hasattr(kind, "_fields"):
-        names = kind._fields
-    else:
-        return None
-    try:
-        hints = typing.get_type_hints(kind, include_extras=True)
-    except Exception:  # names that exist only for type checkers
-        hints = {}
-    return {name: hints.get(name, Any) for name in names}
+    names = names_of(kind)
+    hints = {} if names is None else hints_of(kind)
+    return None if names is None else {name: hints.get(name, Any) for name in names}
 
 
 class Form(NamedTuple):

@@ -16,7 +16,6 @@ import enum
 import pathlib
 import pickle
 import struct
-import sys
 import uuid
 from collections import deque
 from collections.abc import Callable
@@ -26,6 +25,7 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
+from hfg.encoding.records import imported
 from hfg.errors import HfgError
 from hfg.recording.forms import bare, fields_of, form_of, reference
 
@@ -322,8 +322,8 @@ class Codec:
 
         An object of any class could run code when it is deleted.
         """
-        found = self._classes.get(name) or _found(name)
-        if found is None:
+        found = self._classes.get(name) or imported(name)
+        if not isinstance(found, type):
             raise CannotKeep(f"its type {name} is unknown here: import the module that has it first")
         if form_of(found).kind != form or hasattr(found, "__del__"):
             raise CannotKeep(f"its type {name} is not data: only structs, dataclasses, named tuples and enums are")
@@ -362,15 +362,7 @@ def _text(value: str) -> Any:
 
 
 def _is_found(kind: Any) -> bool:
-    return _found(reference(kind)) is kind
-
-
-def _found(name: str) -> Any:
-    module, _, qualname = name.partition(":")
-    found: Any = sys.modules.get(module)
-    for part in qualname.split("."):
-        found = getattr(found, part, None)
-    return found if isinstance(found, type) else None
+    return imported(reference(kind)) is kind
 
 
 def _base64(value: bytes | bytearray) -> bytes:
