@@ -6,6 +6,7 @@ Regions are fused from the first firing on here. `test_soak_fused.py` compares m
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import random
 import traceback
 from typing import Any
@@ -15,6 +16,8 @@ import pytest
 import hfg
 from hfg import commands as c
 from hfg.cli.show import user_traceback
+from hfg.engine.fusion.region import Region
+from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.runtime import settings
 from hfg.testing import Divergence, recorder, reference_run, replay
 from hfg.testing.plans import GraphPlan
@@ -27,6 +30,7 @@ from tests.support.shrinking import shrink
 
 LEAST_SHARE = 0.25  # of all firings and calls are fused
 MOST_MOVES = 1500
+MOST_MOVES_OF_LARGE = 5000
 BESIDE_THREADS = Allowed(plain=True, threads=True, lossy=False, gates=False)
 
 
@@ -40,10 +44,28 @@ def plain_shapes(seed: int) -> Allowed:
     return Allowed(plain=True, max_nodes=4 + seed % 9, sending=seed % 2 == 1, strange=seed % 5 == 4)
 
 
+def large_shapes(seed: int) -> Allowed:
+    """Regions of 10 to 60 members, with forks, joins over several levels and several outputs; few things split them."""
+    return Allowed(
+        plain=True,
+        large=True,
+        sending=seed % 2 == 1,
+        waiting=seed % 3 == 0,
+        failures=seed % 4 == 0,
+        events=seed % 5 == 4,
+        activity=seed % 5 == 4,
+        cycles=False,
+        gates=False,
+        disabling=False,
+        readiness=False,
+    )
+
+
 def ends(plan: GraphPlan, seed: int) -> bool:
     """Whether it comes to an end by itself."""
     try:
-        reference_run(plan.build(), seed=seed, max_moves=MOST_MOVES)
+        most = MOST_MOVES if len(plan.nodes) < 20 else MOST_MOVES_OF_LARGE
+        reference_run(plan.build(), seed=seed, max_moves=most)
     except RuntimeError:
         return False
     return True
@@ -144,6 +166,35 @@ def test_fused_interpreted_and_watched_runs_are_one(block: int, monkeypatch: pyt
     for seed in range(15 * block, 15 * block + 15):
         check(calls, seed, plain_shapes(seed))
     assert calls.share > LEAST_SHARE
+
+
+@pytest.mark.slow
+@pytest.mark.rule("R2", "R7", "F3", "F4", "F5", "T5", "X1")
+@pytest.mark.parametrize("block", range(3))
+def test_large_regions_and_interpreted_nodes_are_one(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = note_calls(monkeypatch)
+    for seed in range(3 * block, 3 * block + 3):
+        check(calls, seed, large_shapes(seed))
+
+
+@pytest.mark.slow
+def test_large_shapes_make_large_regions_and_are_interpreted_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes: list[int] = []
+    begin = Region.__init__
+
+    def noted(region: Region, schedule: Schedule, *others: Any) -> None:
+        sizes.append(len(schedule.order))
+        begin(region, schedule, *others)
+
+    monkeypatch.setattr(Region, "__init__", noted)
+    largest = []
+    for seed in range(12):
+        sizes.clear()
+        with contextlib.suppress(hfg.errors.RunError):
+            hfg.run(random_plan(seed, large_shapes(seed)).build(), clock="virtual", until_s=30.0)
+        largest.append(max(sizes, default=0))
+    assert sum(size >= 10 for size in largest) >= 6, largest
+    assert max(largest) >= 40, largest
 
 
 @pytest.mark.slow

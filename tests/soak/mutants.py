@@ -11,6 +11,7 @@ __all__ = ["MUTANTS", "Mutant"]
 
 _RULES: Final = ("tests/semantics/test_fused_rules.py",)
 _SENDING: Final = ("tests/semantics/test_fused.py", "-k", "not interpreted and not beside")
+_LARGE: Final = ("tests/semantics/test_fused.py", "-k", "large")
 _MEDDLING: Final = ("tests/semantics/test_fused_meddling.py",)
 _LOOKING: Final = ("tests/recording/test_fused.py", "-k", "not random")
 _BOUNDED: Final = ("tests/links/test_bounded.py",)
@@ -47,6 +48,22 @@ def _link(name: str, rule: str, file: str, old: str, new: str) -> Mutant:
 
 
 MUTANTS: Final = (
+    _fused(
+        "in a region of more than 16 members two share the local of their outputs",
+        "F3",
+        "schedule",
+        'return f"v{source}_{next(',
+        'return f"v{source % 16}_{next(',
+        _LARGE,
+    ),
+    _fused(
+        "from the 17th member of a region on, branches are taken in the wrong order",
+        "R2",
+        "schedule",
+        "stack.extend(reversed(enabled))",
+        "stack.extend(reversed(enabled) if len(order) < 17 else enabled)",
+        _LARGE,
+    ),
     _fused(
         "a member whose inputs are all optional is called with nothing",
         "F4",

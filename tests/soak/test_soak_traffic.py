@@ -1,4 +1,4 @@
-"""Eight hours of traffic at 30 tokens a second, as fast as the machine can: memory stays flat (rules L1, L2)."""
+"""Eight hours of traffic at 100 tokens a second, as fast as the machine can: memory stays flat (rules L1, L2)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import hfg
 
 pytest.importorskip("zenoh", reason="processes speak over Zenoh")
 
-TOKENS = 8 * 3600 * 30
+TOKENS = 8 * 3600 * 100
 
 
 @hfg.node

@@ -66,6 +66,7 @@ class Allowed(making.Allowed):
       sending: nodes send in every way there is, from plain and async code, with and without pauses.
       strange: values that raise when they are inspected; most errors are skipped.
       plain: mostly functions next to each other: the shapes that regions are made of.
+      large: regions of 10 to 60 members, with joins over several levels; only if `plain`.
       alive: activity everywhere: nodes that fire, are called and trigger, gates, active edges.
     """
 
@@ -86,6 +87,7 @@ class Allowed(making.Allowed):
     sending: bool = False
     strange: bool = False
     plain: bool = False
+    large: bool = False
     alive: bool = False
 
 
@@ -167,7 +169,7 @@ class Wide(Making):
 
     def __init__(self, choose: making.Chooser, allowed: Allowed) -> None:
         super().__init__(choose, allowed)
-        self.longest = 24 if allowed.plain else 5
+        self.longest = 24 if allowed.plain and not allowed.large else 5
 
     def plan(self) -> GraphPlan:
         """Make the plan."""
@@ -180,13 +182,19 @@ class Wide(Making):
 
     def chance(self, percent: int) -> bool:
         """Such features keep a node out of a region, or split one, so they are rare where regions are wanted."""
+        if self.allowed.large:
+            return self.choose.chance(1) and super().chance(percent)
         return super().chance(percent // 3 if self.allowed.plain else percent)
 
     # --- nodes
 
     def make_nodes(self) -> None:
         """Make all nodes."""
-        super().make_nodes()
+        if self.allowed.large:
+            for number in range(self.choose.number(11, 61)):
+                self.make_node(f"n{number}", self.kind_of(number))
+        else:
+            super().make_nodes()
         if self.allowed.rings:
             self.make_rings()
 
@@ -222,7 +230,7 @@ class Wide(Making):
         """Choose the type of a node."""
         if self.allowed.sources and (number == 0 or self.chance(20)):
             return self.choose.one_of(self.sources())
-        is_plain = self.allowed.plain and not self.choose.chance(15)
+        is_plain = self.allowed.plain and not self.choose.chance(2 if self.allowed.large else 15)
         return self.choose.one_of(self.plain() if is_plain else self.inner())
 
     def sources(self) -> list[str]:
@@ -369,10 +377,11 @@ class Wide(Making):
         near = self.outputs(self.nodes[:index]) if node.type == "Hums" and self.allowed.parameters else []
         if near and self.choose.chance(85):
             self.connect(self.choose.one_of(near), (node.name, "parameter", "tone"))
+        most = 99 if self.allowed.large else 92  # a large region without an input here and there falls apart
         for port, spec in self.type_of(node.name).inputs.items():
             if index and self.nodes[index - 1].type in self.wired and port != "a":
                 self._wire(self.nodes[index - 1], (node.name, "input", port))
-            elif self.choose.chance(60 if spec.optional and not self.allowed.plain else 92):
+            elif self.choose.chance(60 if spec.optional and not self.allowed.plain else most):
                 self.connect_input(index, (node.name, "input", port))
 
     def connect_input(self, index: int, target: End) -> None:
@@ -384,6 +393,8 @@ class Wide(Making):
 
     def near(self, ends: list[End]) -> list[End]:
         """Return the outputs from which an input is connected: where regions are wanted, mostly the last ones."""
+        if self.allowed.large:
+            return ends[-12:] if self.choose.chance(70) else ends
         return ends[-3:] if self.allowed.plain and self.choose.chance(90) else ends
 
     def _wire(self, before: NodePlan, target: End) -> None:
