@@ -190,7 +190,12 @@ def test_every_edge_is_drawn_or_tagged_in_the_mission_and_drawn_among_all_edges(
 
 def test_the_view_activity_has_states_what_feeds_them_and_one_line_for_each_pair() -> None:
     drawn = laid("delivery", "activity")
-    assert {one.name for one in drawn.nodes if not one.is_state} >= {"newest"}
+    feeders = {one.id.removeprefix("robot_0/") for one in drawn.nodes if not one.is_state}
+    assert feeders == {
+        "newest",
+        "refused",
+        *(f"perception/{one}" for one in ("localise", "others", "targets", "stations", "cube")),
+    }
     assert "give_way" not in {one.name for one in drawn.nodes}
     says = {(line.edges[0].source, line.edges[0].target): line.says for line in drawn.lines if line.is_active}
     assert says["robot_0/advance.done", "robot_0/fetch.begin"] == "done or 10.1 s"

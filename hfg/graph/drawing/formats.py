@@ -90,7 +90,7 @@ def view_of(
                 f'"{node.place.path}" cannot be folded, because it is not a subgraph; leave it out of fold='
             )
     shown = None if active is None else frozenset(_nodes(level, "active", active))
-    return View(cast("Kind | None", kind), depth, frozenset(folded), shown, ports == "all")
+    return View(cast("Kind | None", kind), depth, frozenset(folded), active=shown, all_ports=ports == "all")
 
 
 def _nodes(level: Level, what: str, given: Iterable[Node | str]) -> list[Node]:

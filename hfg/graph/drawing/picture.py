@@ -226,6 +226,7 @@ def _opened(level: Level, view: View) -> tuple[list[Level], Mapping[Node, Node]]
             inner = inside(node)
             if inner is not None:
                 is_folded = node in view.folded or (view.depth is not None and depth >= view.depth)
+                is_folded = is_folded and path_of(node) not in view.opened
                 waiting.append((inner, depth + 1, within or (node if is_folded else None)))
     return opened, hidden
 

@@ -23,6 +23,7 @@ class View(msgspec.Struct, frozen=True):
         None: "mission" if activity moves between nodes of the level, else "all".
       depth: so many subgraphs inside each other are open, all others folded; None opens all.
       folded: these subgraphs are, whatever the depth.
+      opened: the subgraphs with these paths are open, whatever the depth.
       active: these nodes and subgraphs are shown as active; None: those that are, in a run.
       all_ports: ports are shown that nothing is connected to, too.
       measured: nodes have room for bars and figures.
@@ -33,6 +34,7 @@ class View(msgspec.Struct, frozen=True):
     kind: Kind | None = None
     depth: int | None = None
     folded: frozenset[Node] = frozenset()
+    opened: frozenset[str] = frozenset()
     active: frozenset[Node] | None = None
     all_ports: bool = False
     measured: bool = False

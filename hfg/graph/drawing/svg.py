@@ -211,7 +211,12 @@ def _net(lines: Sequence[Line], view: str) -> Iterator[str]:
         yield f'<path class="hfg-halo{" hfg-wide" if active else ""}" d="{halo}"/>'
     classes = f"hfg-line hfg-{lines[0].kind}" + (" hfg-active" if active else "")
     classes += " hfg-back" if view == "mission" and not active else ""
-    ends = [_head(line.points, is_active=active) if _has_tip(line, view) else ("", line.points[-1]) for line in lines]
+    ends = [
+        _head(line.points, _PORT_SIZE + 1 if view != "activity" else 1.5, is_active=active)
+        if _has_tip(line, view)
+        else ("", line.points[-1])
+        for line in lines
+    ]
     strokes = dict.fromkeys((False, True), "")
     for line, (_, end) in zip(lines, ends, strict=True):
         strokes[bool(line.combs)] += _curve(line.points, end)
@@ -245,12 +250,12 @@ def _has_tip(line: Line, view: str) -> bool:
     return line.is_active or view == "activity" or line.points[-2][0] == line.points[-1][0]
 
 
-def _head(way: Sequence[Point], *, is_active: bool) -> tuple[str, Point]:
+def _head(way: Sequence[Point], room: float, *, is_active: bool) -> tuple[str, Point]:
     """Draw the head of an arrow in front of its port; give where the line ends under it, too."""
     (x0, y0), (x, y) = way[-2], way[-1]
     dx, dy = (x > x0) - (x < x0), (y > y0) - (y < y0)
     wide = 5.0 if is_active else 3.6
-    x, y = x - dx * (_PORT_SIZE + 1), y - dy * (_PORT_SIZE + 1)
+    x, y = x - dx * room, y - dy * room
     back_x, back_y = x - dx * _HEAD, y - dy * _HEAD
     tip = (
         f"M{_n(x)} {_n(y)}L{_n(back_x - dy * wide)} {_n(back_y - dx * wide)}"

@@ -15,8 +15,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from msgspec.structs import replace
+
 from hfg.graph.drawing.layout.finishing import lines_of, node_of
 from hfg.graph.drawing.layout.laying import lay
+from hfg.graph.drawing.layout.overview import feeders, take_out
 from hfg.graph.drawing.layout.parts import Work
 from hfg.graph.drawing.layout.wiring import Level, Levels, wired
 from hfg.graph.drawing.model import Layout, Line, NodeBox
@@ -40,6 +43,9 @@ def lay_out(graph: HasLevel, view: View = EVERYTHING) -> Layout:
       All nodes and lines with their places. Equal graphs give equal layouts.
     """
     seen = picture(graph, view)
+    if view.kind == "activity" and (opened := feeders(seen)):
+        seen = picture(graph, replace(view, opened=opened))
+        take_out(seen, opened)
     known = Levels(seen)
     found = known.all
     works: dict[int, tuple[Work, Kind]] = {}

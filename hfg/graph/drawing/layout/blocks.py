@@ -24,7 +24,6 @@ __all__ = [
     "PORT",
     "TAG",
     "TAG_HEIGHT",
-    "TO_TAG",
     "badge_width",
     "halves",
     "place_level",
@@ -53,7 +52,6 @@ _COMB: Final = 10.0  # others
 _LEAST: Final = 22.0  # between ports side by side
 _MEASURED: Final = (72.0, 176.0)  # a node with bars
 TAG_HEIGHT: Final = 14.0
-TO_TAG: Final = 6.0  # the line from a port to its tag
 
 
 def up(number: float, grid: float = GRID) -> float:
@@ -106,8 +104,8 @@ def size(thing: Thing, *, measured: bool, inner: tuple[float, float] | None = No
     thing.width, thing.height = up(max(*wide, 96.0)), up(height)
     _place_upright(thing, sides, header)
     thing.left, thing.right = (_beside(sides[side]) for side in ("left", "right"))
-    thing.top = max((TAG_HEIGHT + TO_TAG for one in sides["top"] if one.tagged), default=0.0)
-    thing.bottom = max((TAG_HEIGHT + TO_TAG for one in sides["bottom"] if one.tagged), default=0.0)
+    thing.top = max((TAG_HEIGHT + one.to_tag for one in sides["top"] if one.tagged), default=0.0)
+    thing.bottom = max((TAG_HEIGHT + one.to_tag for one in sides["bottom"] if one.tagged), default=0.0)
     thing.bottom = max(thing.bottom, 16.0 if any(one.outside for one in sides["bottom"]) else 0.0)
 
 
@@ -158,7 +156,7 @@ def _beside(spots: Sequence[Spot]) -> float:
     if not _is_named(spots):  # they share one
         tags = [[name for names in tags for name in names]] if tags else []
     texts = [tag_text(names, is_in=spots[0].side == "left") for names in tags]
-    return max((tag_width(text) + TO_TAG + 6.0 for text in texts), default=0.0)
+    return max((tag_width(text) + max(one.to_tag for one in spots) + 6.0 for text in texts), default=0.0)
 
 
 def _order_upright(spot: Spot) -> tuple[object, ...]:

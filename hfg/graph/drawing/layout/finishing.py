@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any, Final, Literal, TypeAlias
 
-from hfg.graph.drawing.layout.blocks import LONGEST_SAID, PORT, TAG_HEIGHT, TO_TAG, tag_text, tag_width
+from hfg.graph.drawing.layout.blocks import LONGEST_SAID, PORT, TAG_HEIGHT, tag_text, tag_width
 from hfg.graph.drawing.layout.parts import Link, Spot, Thing, Work
 from hfg.graph.drawing.model import EdgeEnds, Line, NodeBox, Point, PortSpot, Tag
 from hfg.graph.drawing.seen import Arrow
@@ -134,17 +134,19 @@ def _tag(spot: Spot, at: Point, names: Sequence[str], kind: str) -> tuple[list[P
     sign = -1 if spot.side in ("left", "top") else 1
     if spot.side in ("left", "right"):
         if spot.is_linked:
-            points = [(x, y), (x + 4 * sign, y), (x + 4 * sign, y + 14), (x + TO_TAG * sign, y + 14)]
+            points = [(x, y), (x + 4 * sign, y), (x + 4 * sign, y + 14), (x + spot.to_tag * sign, y + 14)]
             y += 14.0
         else:
-            points = [(x, y), (x + TO_TAG * sign, y)]
-        left = x + TO_TAG if sign > 0 else x - TO_TAG - width
+            points = [(x, y), (x + spot.to_tag * sign, y)]
+        left = x + spot.to_tag if sign > 0 else x - spot.to_tag - width
         return points, Tag(text, tuple(names), kind, left, y - half, width, TAG_HEIGHT)
     if spot.is_linked:
         points = [(x, y), (x, y + 12 * sign), (x + 10, y + 12 * sign)]
         return points, Tag(text, tuple(names), kind, x + 10, y + 12 * sign - half, width, TAG_HEIGHT)
-    top = y + TO_TAG if sign > 0 else y - TO_TAG - TAG_HEIGHT
-    return [(x, y), (x, y + TO_TAG * sign)], Tag(text, tuple(names), kind, round(x - width / 2), top, width, TAG_HEIGHT)
+    top = y + spot.to_tag if sign > 0 else y - spot.to_tag - TAG_HEIGHT
+    return [(x, y), (x, y + spot.to_tag * sign)], Tag(
+        text, tuple(names), kind, round(x - width / 2), top, width, TAG_HEIGHT
+    )
 
 
 def _to_bar(port: Point, points: Sequence[Point]) -> list[Point]:

@@ -18,6 +18,7 @@ from hfg.graph.drawing.seen import Kind, View
 __all__ = ["lay"]
 
 _GUTTER_PAD: Final = 12.0  # from a lane to the first track: there is room for a comb
+_WITH_HEADS: Final = 20.0  # the same for the head of an arrow
 _GAP_PAD: Final = 12.0  # from a row to the first track: there is room for the head of an arrow
 _TALL: Final = 120.0  # such a thing is not in the middle of its row
 _ALIKE: Final = 48.0  # things of one lane that are nearly as wide are made as wide
@@ -42,7 +43,7 @@ def lay(work: Work, view: View, kind: Kind, inner_sizes: Mapping[str, tuple[floa
         work.links = _jumping(work.links)
     _order_ports(work)
     inner = [link for link in work.links if link.tail is not None and link.head is not None]
-    _Lanes(work, inner).lay()
+    _Lanes(work, inner, _WITH_HEADS if kind == "activity" else _GUTTER_PAD).lay()
     if view.places:
         _keep_places(work.things, view)
         _lead(inner, Grid.of_places(work.things))
@@ -151,8 +152,8 @@ def _same_widths(things: Sequence[Thing]) -> None:
 class _Lanes:
     """The grid of the things to place; its channels become as wide as their lines need."""
 
-    def __init__(self, work: Work, links: list[Link]) -> None:
-        self.work, self.links = work, links
+    def __init__(self, work: Work, links: list[Link], pad: float) -> None:
+        self.work, self.links, self.pad = work, links, pad
         self.first = min((one.lane for one in work.things), default=0)
         self.lanes = max((one.lane for one in work.things), default=-1) - self.first + 1
         self.rows = max((one.row + one.span for one in work.things), default=0)
@@ -193,7 +194,7 @@ class _Lanes:
                 x += self._lane(by_lane.get(strip // 2, []), x)
             else:
                 least = GUTTER if 0 < strip < 2 * self.lanes else 0.0
-                x += needed(self.counts["x"].get(strip, 0), least, _GUTTER_PAD)
+                x += needed(self.counts["x"].get(strip, 0), least, self.pad)
         self.grid.x.edges[-1] = x
         heights = self._row_heights()
         y = 0.0

@@ -1,16 +1,52 @@
 """The view "activity": states and what feeds them, one line for each pair, as in Figure 19 of the paper.
 
 Ports are left out. A line has the names of the events that lead along it, because a reader of the mission wants to know
-which events move it, not which slots they reach.
+which events move it, not which slots they reach. Of a subgraph that feeds states only the nodes inside that do so are
+shown: "perception" feeds everything, but its node "cube" says what for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from hfg.graph.drawing.layout.parts import Link, Spot, Thing, Work
+from msgspec.structs import replace
 
-__all__ = ["to_overview"]
+from hfg.graph.drawing.layout.parts import Link, Spot, Thing, Work
+from hfg.graph.drawing.seen import Arrow, Picture
+
+__all__ = ["feeders", "take_out", "to_overview"]
+
+
+def feeders(seen: Picture) -> frozenset[str]:
+    """Return the paths of subgraphs that are folded and feed states, but are not states themselves."""
+    by_id = {shape.id: shape for _, shape in seen.items}
+    pairs = [(by_id[arrow.tail], by_id[arrow.head]) for arrow in seen.arrows if not (arrow.is_active or arrow.is_gate)]
+    return frozenset(tail.path for tail, head in pairs if tail.inner and head.is_state and not tail.is_state)
+
+
+def take_out(seen: Picture, opened: frozenset[str]) -> None:
+    """Put the nodes in these subgraphs that feed states next to the subgraph, and leave the rest of it out."""
+    inside: set[str] = set()
+    boxes: list[int] = []
+    for depth, shape in seen.items:
+        boxes = [at for at in boxes if at < depth]
+        if boxes:
+            inside.add(shape.id)
+        if shape.path in opened:
+            boxes.append(depth)
+            inside.add(shape.id)
+    into: dict[str, list[Arrow]] = {}
+    for arrow in seen.arrows:
+        if arrow.head in inside and not arrow.is_gate:
+            into.setdefault(arrow.head, []).append(arrow)
+    states = {shape.id for _, shape in seen.items if shape.is_state} - inside
+    arrows = [arrow for arrow in seen.arrows if not {arrow.tail, arrow.head} & inside]
+    for arrow in seen.arrows:
+        inner_ones = into.get(arrow.tail, ()) if arrow.head in states else ()
+        arrows += (replace(arrow, tail=one.tail, out_of=one.out_of, is_signal=one.is_signal) for one in inner_ones)
+    kept = {arrow.tail for arrow in arrows} | {shape.id for _, shape in seen.items} - inside
+    seen.items = [(0 if shape.id in inside else depth, shape) for depth, shape in seen.items if shape.id in kept]
+    seen.arrows = [arrow for arrow in arrows if {arrow.tail, arrow.head} <= kept]
 
 
 def to_overview(work: Work) -> None:
@@ -74,5 +110,6 @@ def _said(thing: Thing | None, spot: Spot) -> str:
 def _spot(thing: Thing, kind: str, name: str, of: Iterable[Spot], is_tail: bool) -> Spot:
     found = thing.spots.setdefault((kind, name, is_tail), Spot(kind, name, "top", is_plain=True))
     found.tagged += [tag for spot in of for tag in spot.tagged if tag not in found.tagged]
+    found.to_tag = max(found.to_tag, *(spot.to_tag for spot in of))
     found.is_linked = found.is_linked or any(spot.is_linked for spot in of)
     return found

@@ -31,6 +31,7 @@ class Spot(msgspec.Struct, eq=False):
       comb: which bundle it belongs to, by the number of a net; -1: none. Spots of one comb are neighbours.
       pull: which way its lines go from here: negative to the left.
       tagged: names of ports of the level that it leads to or comes from.
+      to_tag: how long the line to its tag is; that of activity has a head.
       is_linked: a line leads to another thing, too.
       outside: what is written below it, next to its line.
     """
@@ -45,6 +46,7 @@ class Spot(msgspec.Struct, eq=False):
     comb: int = -1
     pull: float = 0.0
     tagged: list[str] = []
+    to_tag: float = 6.0
     is_linked: bool = False
     outside: str = ""
 

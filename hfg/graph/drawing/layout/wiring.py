@@ -149,6 +149,7 @@ class _Wiring:
             for spot in spots:
                 if tail is None or head is None:
                     spot.tagged.append(self.known.by_id[other].name)
+                    spot.to_tag = 14.0 if arrow.is_active else spot.to_tag
                 else:
                     spot.is_linked = True
         self.work.links.append(Link([arrow], tail, head, tails, heads))
