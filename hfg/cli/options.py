@@ -11,8 +11,8 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from hfg.cli import completing
+from hfg.engine.runtime.settings import RunFields
 from hfg.graph.structure.option import declared
-from hfg.graph.structure.options import RunFields
 
 __all__ = [
     "AllowOption",

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import msgspec
 
 from hfg.engine import Run, running
-from hfg.engine.editing.pausing import Breakpoint
+from hfg.engine.editing.breakpoints import Breakpoint
 from hfg.errors import HfgError, NotRunning
 from hfg.graph import Graph
 from hfg.graph.editing.commands import Command

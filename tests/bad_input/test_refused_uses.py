@@ -524,7 +524,10 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "reload nobody": (running(lambda run, g: run.reload("nobody")), 'module "nobody" cannot be reloaded: it is not im'),
     "reload a file": (running(lambda run, g: run.reload("robot.py")), 'name the module, "robot", not its file'),
     "reload a number": (running(lambda run, g: run.reload(3)), "reload takes a module or its name, as in run.reload("),
-    "step on": (running(lambda run, g: run.step()), "a wave cannot step while the run goes on: run.pause() first"),
+    "step on": (
+        running(lambda run, g: run.step()),
+        "a wave cannot step while the run is not paused: run.pause() first",
+    ),
     "break at nobody": (running(lambda run, g: run.break_at("nobody")), NO_NODE),
     "break at a node when": (running(lambda run, g: run.break_at("count", when=bool)), "when= looks at a token: give"),
     "break when 3": (running(lambda run, g: run.break_at("count.out", when=3)), "when= takes a function of the token"),

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg.engine.runtime.settings import RunFields, RunGiven
 from hfg.graph import EdgeGiven, EdgeOptions, GroupGiven, GroupSpec, NodeGiven, NodeOptions
 from hfg.graph.structure.option import declared
-from hfg.graph.structure.options import RunFields, RunGiven
 from tests.support import one_more_option, option_tables
 
 ALL = [2.5, 3, 7]

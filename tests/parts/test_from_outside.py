@@ -422,7 +422,7 @@ def test_a_breakpoint_anywhere_pauses_all_processes(place: str) -> None:
 @pytest.mark.rule("R3", "L1")
 def test_steps_that_cannot_be_are_refused_as_in_one_process() -> None:
     async def body(run: hfg.Run) -> None:
-        with pytest.raises(UsageError, match=r"scaler cannot step while the run goes on: run.pause\(\) first"):
+        with pytest.raises(UsageError, match=r"scaler cannot step while the run is not paused: run.pause\(\) first"):
             await run.step("scaler")
         with pytest.raises(UsageError, match="cannot go to the process of group"):
             run.break_at("scaler.out", when=lambda token: True)

@@ -353,7 +353,7 @@ def test_what_cannot_be_done_is_one_sentence_and_the_run_goes_on() -> None:
         with pytest.raises(hfg.errors.UsageError, match="look at a token|looks at a token"):
             run.break_at(node, when=bool)
         run.resume()
-        with pytest.raises(hfg.errors.UsageError, match=r"while the run goes on: run\.pause\(\) first"):
+        with pytest.raises(hfg.errors.UsageError, match=r"while the run is not paused: run\.pause\(\) first"):
             await run.step(source)
         run.pause()
 

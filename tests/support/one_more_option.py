@@ -1,7 +1,7 @@
 """What becomes of options that hfg does not have: run as a program, it prints what each path makes of them, as JSON.
 
-It lets `hfg/graph/structure/options.py` declare one more option of an edge, a node, a group and a run, before anything
-imports it. Nothing else is changed.
+It lets the modules of `DECLARED` declare one more option of an edge, a node, a group and a run, before anything imports
+them. Nothing else is changed.
 """
 
 from __future__ import annotations
@@ -17,22 +17,26 @@ from pathlib import Path
 from types import CodeType
 from typing import Any
 
-MODULE = "hfg.graph.structure.options"
+GRAPH, RUN = "hfg.graph.structure.options", "hfg.engine.runtime.settings"
 DECLARED = (
     (
+        GRAPH,
         "class EdgeFields(Fields[EdgeGiven[Any, Any]], kw_only=True):\n",
         "    max_age_s: Annotated[float | None, Option('No signal waits longer.', above=0, only='events', "
         "badge='{:g} s')] = None\n",
     ),
     (
+        GRAPH,
         "class NodeFields(Fields[NodeGiven], kw_only=True):\n",
         "    weight: Annotated[int, Option('Its share of the processor.', least=1, badge='weight {}')] = 1\n",
     ),
     (
+        GRAPH,
         "class GroupFields(Fields[GroupGiven], kw_only=True):\n",
         "    nice: Annotated[int, Option('As of ours.', least=0)] = 0\n",
     ),
     (
+        RUN,
         "class RunFields(Fields[RunGiven], kw_only=True):\n",
         "    lap: Annotated[int, Option('Its number.', least=1, flag='--lap', everywhere=True)] = 1\n",
     ),
@@ -42,7 +46,7 @@ DECLARED = (
 class _Loader(importlib.machinery.SourceFileLoader):
     def get_code(self, fullname: str) -> CodeType:
         text = Path(self.path).read_text(encoding="utf-8")
-        for place, field in DECLARED:
+        for place, field in [(place, field) for module, place, field in DECLARED if module == self.name]:
             head, found, rest = text.partition(place)
             assert found, f"{place!r} is not in {self.path}"
             docstring, end, body = rest.partition('."""\n')
@@ -52,9 +56,9 @@ class _Loader(importlib.machinery.SourceFileLoader):
 
 class _Finder:
     def find_spec(self, name: str, *_: object) -> importlib.machinery.ModuleSpec | None:
-        if name != MODULE:
+        if name not in (GRAPH, RUN):
             return None
-        file = Path(__file__).parents[2] / f"{MODULE.replace('.', '/')}.py"
+        file = Path(__file__).parents[2] / f"{name.replace('.', '/')}.py"
         return importlib.util.spec_from_file_location(name, file, loader=_Loader(name, str(file)))
 
 

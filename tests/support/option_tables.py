@@ -7,9 +7,9 @@ import re
 from pathlib import Path
 from typing import Any, Final
 
+from hfg.engine.runtime.settings import RunFields
 from hfg.graph import EdgeOptions, GroupSpec, NodeOptions
 from hfg.graph.structure.option import Fields, declared
-from hfg.graph.structure.options import RunFields
 
 PAGE: Final = Path(__file__).parents[2] / "docs" / "reference.md"
 _ONLY: Final = {

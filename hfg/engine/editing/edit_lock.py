@@ -1,7 +1,7 @@
 """Edits of a run take effect one after the other (rule R4), and code of nodes may ask for them.
 
-What must not be is code that waits for an edit that waits for this code: of its own node, or of two nodes that edit
-each other. Whoever asks last is refused, with a sentence. Decides who waits for whom; knows nothing of edits.
+Code must not wait for an edit that waits for that code: a node that edits itself, or two nodes that edit each other,
+would wait forever. The last of them gets an error. This module knows which code waits for which edit, and nothing else.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ __all__ = ["EditLock"]
 
 
 class EditLock:
-    """Who edits now, and who waits for that."""
+    """Knows who edits now, and who waits."""
 
     def __init__(self) -> None:
         self._taken = False
         self._waiting: deque[asyncio.Future[None]] = deque()
-        self._asking: dict[RunningNode, asyncio.Future[None]] = {}  # whose code waits for its turn
-        self._awaited: set[RunningNode] = set()  # the end of whose code the present edit waits for
+        self._asking: dict[RunningNode, asyncio.Future[None]] = {}  # nodes whose code waits for the lock
+        self._awaited: set[RunningNode] = set()  # nodes for whose code the present edit waits
 
     @asynccontextmanager
     async def one(self) -> AsyncIterator[None]:
-        """Wait for the others; inside the block nobody else edits.
+        """Wait for earlier edits; no other edit is made inside the block.
 
         Raises:
-          UsageError: an edit waits for the end of the code that asks, or soon will.
+          UsageError: an edit waits for the end of the calling code, or soon will.
         """
         await self._take(_asking_node())
         try:
@@ -43,14 +43,14 @@ class EditLock:
             self._pass_on()
 
     def wait_for(self, workers: Iterable[RunningNode], *, tasks_too: bool = False) -> None:
-        """The present edit waits from now on for the code of these, and of nobody else, to come to its end.
+        """Note that the present edit now waits for the code of these nodes, and of no others, to end.
 
         Args:
-          workers: whose.
-          tasks_too: and of the tasks that it has firing, for the nodes are torn down.
+          workers: the nodes.
+          tasks_too: the edit also waits for their background tasks, because the nodes are torn down.
 
         Raises:
-          UsageError: it was asked for by the code of one of them.
+          UsageError: code of one of them has asked for this edit.
         """
         self._awaited = set(workers)
         task = current_task.get()
@@ -79,7 +79,7 @@ class EditLock:
             if waiter in self._waiting:
                 self._waiting.remove(waiter)
             elif waiter.done() and not waiter.cancelled() and waiter.exception() is None:
-                self._pass_on()  # it had just been given to us
+                self._pass_on()  # we had just received the lock
             raise
         finally:
             if speaker is not None:
@@ -88,14 +88,14 @@ class EditLock:
     def _pass_on(self) -> None:
         while self._waiting:
             waiter = self._waiting.popleft()
-            if not waiter.done():  # else it was cancelled just now
+            if not waiter.done():  # otherwise it was cancelled just now
                 waiter.set_result(None)
                 return
         self._taken = False
 
 
 def _asking_node() -> RunningNode | None:
-    """Whose code asks; a task that it has firing is nobody's, for nothing waits for that."""
+    """Return the node whose code asks; background tasks do not count, because no edit waits for them."""
     worker = whose_code()
     firing = current_firing.get()
     eager_task = None if worker is None else worker.execution.eager_task if firing is None else firing.eager_task
@@ -104,6 +104,6 @@ def _asking_node() -> RunningNode | None:
 
 def _waits_for_itself(worker: RunningNode) -> UsageError:
     return UsageError(
-        f'"{worker.path}" edits the graph in the middle of its code and would wait for ever, for the edit, or one '
+        f'"{worker.path}" edits the graph in the middle of its code and would wait for ever, because the edit, or one '
         "before it, waits for the end of this code: do it in a task, asyncio.create_task(run.edit(...))"
     )

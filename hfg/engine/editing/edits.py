@@ -1,15 +1,14 @@
-"""Edits of a graph that runs: commands, undo and redo that take effect between firings (rule R4).
+"""Edits of a running graph: commands, undo and redo that take effect between firings (rule R4).
 
-One edit after the other: checked on the drawn graph, new nodes are set up while the others go on, then the touched
-nodes are held as they come to rest, the plan is changed at one moment, and all go on. What fails on the way leaves
-graph and run as they were. Stands on `plan_diff`, `applying` and `node_lifecycle`.
+One edit after the other. An edit changes the declared graph, is checked there, and sets up new nodes while all others
+keep running. Then the touched nodes are held as they become idle, the plan is changed at one moment, and all continue.
+An edit that fails on the way leaves graph and run as they were. Pausing the whole run instead would be simpler, but
+then each edit would stop a robot that has nothing to do with it.
 """
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-from collections.abc import Awaitable, Callable, Collection, Coroutine, Iterable, Sequence, Set
+from collections.abc import Awaitable, Callable, Collection, Iterable, Sequence, Set
 from functools import partial
 from types import ModuleType
 from typing import Any
@@ -19,20 +18,18 @@ import msgspec
 from hfg.base.values import same
 from hfg.engine.editing.applying import apply
 from hfg.engine.editing.edit_lock import EditLock
+from hfg.engine.editing.node_hooks import NodeHooks
 from hfg.engine.editing.plan_diff import PlanDiff, diff
 from hfg.engine.editing.plan_index import PlanIndex
 from hfg.engine.editing.quiesce import Quiesced
 from hfg.engine.editing.setting import refuse_without_effect
-from hfg.engine.executing.code import answer, whose_code
 from hfg.engine.model import Scope
-from hfg.engine.model.running_node import BACKOFF, DISABLED, ENDED, UNREADY, RunningNode
-from hfg.engine.rules import concurrency, doing, node_lifecycle, subgraphs
-from hfg.engine.runtime import plan
-from hfg.engine.runtime import ports as engine_ports
+from hfg.engine.model.running_node import BACKOFF, DISABLED, RunningNode
+from hfg.engine.rules import doing, node_lifecycle, subgraphs
 from hfg.engine.runtime.callbacks import Edited
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.run_lifecycle import RunLifecycle
-from hfg.errors import GraphError, HfgError, NodeError, NotRunning
+from hfg.errors import GraphError, NotRunning
 from hfg.graph import Graph
 from hfg.graph.checks import check_flat
 from hfg.graph.editing import Transaction, history_of, may_break, prepare, refuse_new_errors
@@ -49,9 +46,8 @@ from hfg.graph.editing.changes import (
 )
 from hfg.graph.editing.commands import Command, encode
 from hfg.graph.editing.reloading import reloaded
-from hfg.graph.flat import FlatNode, flatten
+from hfg.graph.flat import flatten
 from hfg.graph.structure.membership import write_parameter
-from hfg.graph.structure.places import node_place
 from hfg.trace import ParameterSet, StructureChanged
 
 __all__ = ["Edits"]
@@ -64,7 +60,7 @@ class _Following:
     """One edit, and what is known of it on its way into the run.
 
     Attributes:
-      changes: what was done to the drawn graph.
+      changes: what was done to the declared graph.
       how: what that means to the plan.
       switched: who is enabled or disabled by it.
       values: parameters with which nobody works yet.
@@ -89,7 +85,7 @@ class Edits:
     """Edits the graph of one engine.
 
     Attributes:
-      turns: whoever calls one of `edit_now`, `undo_now` and `redo_now` has a turn, and calls `leave` behind it.
+      lock: callers of `edit_now`, `undo_now` and `redo_now` hold it, and call `leave` after releasing it.
     """
 
     def __init__(self, engine: Engine, run_lifecycle: RunLifecycle) -> None:
@@ -98,6 +94,7 @@ class Edits:
         self._graph: Graph = engine.graph
         self._index: PlanIndex | None = None  # from the first edit on
         self.lock = EditLock()
+        self._hooks = NodeHooks(engine, run_lifecycle, self.lock)
 
     async def edit(self, commands: Sequence[Command]) -> None:
         """See `Run.edit`."""
@@ -112,13 +109,13 @@ class Edits:
             return await self.edit_now(commands)
 
     async def _in_turn(self, now: Callable[[], Awaitable[list[RunningNode]]]) -> None:
-        """One edit after the other; those who are gone are torn down behind the turn."""
+        """Make one edit after the other; nodes that are gone are torn down after releasing the lock."""
         async with self.lock.one():
             gone = await now()
         await self.leave(gone)
 
     async def edit_now(self, commands: Sequence[Command]) -> list[RunningNode]:
-        """Carry commands out; gives who is to be torn down behind the turn."""
+        """Carry commands out; return the nodes to tear down after releasing the lock."""
         self._need_run()
         what = _told(commands)
         transaction = prepare(self._graph, commands, check=False)
@@ -130,7 +127,7 @@ class Edits:
         await self._in_turn(self.undo_now)
 
     async def undo_now(self) -> list[RunningNode]:
-        """Take the last edit back; gives who is to be torn down behind the turn."""
+        """Take the last edit back; return the nodes to tear down after releasing the lock."""
         self._need_run()
         history = history_of(self._graph)
         changes = undo_all(history.next_undo().changes)
@@ -141,7 +138,7 @@ class Edits:
         await self._in_turn(self.redo_now)
 
     async def redo_now(self) -> list[RunningNode]:
-        """Carry out again what was undone last; gives who is to be torn down behind the turn."""
+        """Carry out the edit that was undone last; return the nodes to tear down after releasing the lock."""
         self._need_run()
         history = history_of(self._graph)
         transaction: Transaction = history.next_redo()
@@ -149,37 +146,41 @@ class Edits:
             change.do()
         return await self._follow(transaction.changes, "redo", history.redo_done, check=False)
 
+    async def leave(self, gone: list[RunningNode]) -> None:
+        """Tear down nodes that are gone, even if the caller does not wait for it any more."""
+        await self._hooks.leave(gone)
+
     def _need_run(self) -> None:
         if self._engine.core.over:
             raise NotRunning("the run is over: edit the graph with graph.edit(...)")
 
-    # --- following what was done to the drawn graph
+    # --- following what was done to the declared graph
 
     async def _follow(
         self, changes: Sequence[Change], what: str, note: Callable[[], None], *, check: bool
     ) -> list[RunningNode]:
-        """Let the run be as the drawn graph is, and note that; if it fails, take back what was done to the graph.
+        """Bring the run in line with the declared graph; if that fails, take back what was done to the graph.
 
         Returns:
-          the workers that are gone and have yet to be torn down, for which the next edit does not wait.
+          The workers that are gone and must be torn down. The next edit does not wait for that.
         """
         engine = self._engine
         edit = _Following(changes)
         engine.hold()
         try:
             self._find_out(edit, check=check)
-            torn_down = [*(worker for worker, _, _ in edit.how.swapped), *self._to_start_afresh(edit.switched)]
-            self.lock.wait_for(torn_down, tasks_too=True)
+            swapped = [worker for worker, _, _ in edit.how.swapped]
+            self.lock.wait_for([*swapped, *self._to_start_afresh(edit.switched)], tasks_too=True)
             touched = self._touched(edit)
             self.lock.wait_for(touched)
-            await self._set_up(edit)
+            await self._hooks.set_up(edit.how.come, edit.come)
             self.lock.wait_for(touched)
             async with Quiesced(engine, touched) as held:
                 self.lock.wait_for(())
-                await self._exchange_nodes(edit.how)
+                await self._hooks.exchange(edit.how.swapped)
                 fresh = await self._begin_afresh(edit)
                 self._need_run()
-                if check:  # what is done again is as it was
+                if check:  # undo and redo restore what was there
                     _take_values(edit)
                 for value in edit.values:
                     value.do()
@@ -194,14 +195,14 @@ class Edits:
                 undo_all([change for change in changes if change not in edit.values])
                 _stay_disabled(edit.fresh)
                 self.lock.wait_for(edit.come)
-                await self._to_its_end(self._tear_down(edit.come))
+                await self._hooks.to_its_end(self._hooks.tear_down(edit.come))
             raise
         finally:
             engine.unhold()
         return edit.how.gone
 
     def _find_out(self, edit: _Following, *, check: bool) -> None:
-        """What the changes mean to the run; what no run can follow is refused."""
+        """Find what the changes mean to the run; refuse those that no run can follow."""
         for change in edit.changes:
             _refuse_for_good(change)
         if self._index is None:
@@ -211,14 +212,14 @@ class Edits:
             self._refuse_errors()
         edit.switched = self._switched(edit.changes)
         edit.values = self._values_of_running_nodes(edit.changes)
-        undo_all(edit.values)  # they work with the old ones until their firings are over
+        undo_all(edit.values)  # nodes work with the old values until their current firings are over
         edit.copied = [
             (change, dict(change.source._parameters)) for change in edit.changes if isinstance(change, NodeCopied)
         ]
         self._refuse_without_effect(edit)
 
     async def _begin_afresh(self, edit: _Following) -> list[RunningNode]:
-        """Tear down and set up who is to be enabled, with its new values; gives them back."""
+        """Tear down and set up the nodes that are to be enabled, with their new values; return them."""
         fresh = self._to_start_afresh(edit.switched)
         self._refuse_without_effect(edit)
         starting = {worker.node for worker in fresh}
@@ -227,10 +228,10 @@ class Edits:
             edit.values.remove(value)
         for worker in fresh:
             self.lock.wait_for((worker,))
-            await self._hook(worker, node_lifecycle.tear_down)
+            await self._hooks.run(worker, node_lifecycle.tear_down)
             worker.lifecycle.wait_to_take_part()
             edit.fresh.append(worker)
-            await self._hook(worker, node_lifecycle.set_up)
+            await self._hooks.run(worker, node_lifecycle.set_up)
         return fresh
 
     def _values_of_running_nodes(self, changes: Sequence[Change]) -> list[ParameterChange]:
@@ -239,7 +240,7 @@ class Edits:
         return [value for value in values if value.node in running]
 
     def _refuse_without_effect(self, edit: _Following) -> None:
-        """P8: what the code that runs cannot see is refused, unless the node begins afresh by this very edit."""
+        """Refuse values that running code cannot see (P8), unless this edit starts the node over."""
         if not edit.values:
             return
         how = edit.how
@@ -250,111 +251,16 @@ class Edits:
         )
 
     def _touched(self, edit: _Following) -> list[RunningNode]:
-        """Those who must rest: also all inside a subgraph that is enabled."""
+        """Return the nodes that must be idle, including all inside a subgraph that is enabled."""
         scopes = [worker.scope for worker, enabled in edit.switched.items() if worker.scope is not None and enabled]
         return list(dict.fromkeys([*edit.how.touched, *(member for scope in scopes for member in scope.members)]))
 
     def _refuse_errors(self) -> None:
-        """A graph that runs has no errors, and gets none."""
+        """Refuse an edit after which the graph has errors: a running graph has none."""
         refuse_new_errors((), [one for one in check_flat(flatten(self._graph)) if one.severity == "error"])
 
-    async def _set_up(self, edit: _Following) -> None:
-        """Make workers of the nodes that come and set them up, before anybody is held for them."""
-        engine = self._engine
-        for node in sorted(edit.how.come, key=node_place):
-            said = FlatNode(0, node._place.path, node, edit.how.come[node], ())
-            worker = plan.make_worker(engine.core, said, engine.groups)
-            edit.come.append(worker)
-            self._lifecycle.carry(worker)
-            worker.be_busy("setup")
-            self.lock.wait_for((worker,))
-            worker.lifecycle.wait_to_take_part()
-            await self._hook(worker, node_lifecycle.set_up)
-            self._lifecycle.came(worker)
-
-    async def _hook(self, worker: RunningNode, hook: Callable[[RunningNode, node_lifecycle.Then], None]) -> None:
-        """Run a hook of a node to its end; if the edit is cancelled meanwhile, so is the hook, and waited for.
-
-        Raises:
-          NodeError: it failed.
-        """
-        waiter: asyncio.Future[NodeError | None] = self._engine.loop.create_future()
-        begin = partial(hook, worker, partial(answer, waiter))
-        if whose_code() is None:
-            self._engine.context.run(begin)
-        else:  # the code of a node asks, which runs inside of that context
-            self._engine.soon(partial(self._engine.guard, begin))
-        cancelled: asyncio.CancelledError | None = None
-        while not waiter.done():
-            try:
-                await asyncio.wait({waiter})
-            except asyncio.CancelledError as error:
-                if cancelled is not None or self._engine.core.over:
-                    raise
-                cancelled = error
-                if worker.execution.eager_task is not None:
-                    worker.execution.eager_task.cancel()
-        if cancelled is not None:
-            raise cancelled
-        failure = waiter.result()
-        if failure is not None:
-            raise failure
-
-    async def _to_its_end(self, clearing: Coroutine[Any, Any, None]) -> None:
-        """Clear up after an edit that failed or was cancelled, however often it is cancelled."""
-        task = asyncio.create_task(clearing, name="hfg edit")
-        while not task.done():
-            with contextlib.suppress(asyncio.CancelledError):
-                await asyncio.wait({task})
-        task.result()
-
-    async def _exchange_nodes(self, how: PlanDiff) -> None:
-        """Tear down the nodes that are replaced and set up the others in their place; back again if that fails."""
-        begun: list[tuple[RunningNode, Any]] = []
-        try:
-            for worker, _, node in how.swapped:
-                begun.append((worker, worker.node))
-                await self._become(worker, node)
-        except BaseException:
-            await self._to_its_end(self._become_again(begun))
-            raise
-        for worker, _ in begun:
-            worker.start_over()
-            worker.allow(ENDED | UNREADY)
-
-    async def _become_again(self, begun: list[tuple[RunningNode, Any]]) -> None:
-        """Put the nodes back that were to be replaced; one that cannot be set up again ends the run."""
-        for worker, before in reversed(begun):
-            try:
-                await self._become(worker, before)
-            except HfgError as error:
-                self._engine.finish("failed", error)
-            else:
-                node_lifecycle.take_part(worker)
-                doing.afresh(worker)
-
-    async def _become(self, worker: RunningNode, node: Any) -> None:
-        """Let a worker run another node: teardown, setup. A teardown that fails is told with the other errors (X3)."""
-        self.lock.wait_for((worker,))
-        try:
-            await self._hook(worker, node_lifecycle.tear_down)
-        except NodeError as error:
-            self._engine.core.errors.append(error)
-        engine_ports.release_ports(worker)
-        if worker.execution.eager_task is not None:
-            worker.execution.eager_task.drop()
-            worker.execution.run_in(None)
-        if worker.concurrent is not None:
-            concurrency.abandon(worker)
-            worker.concurrent.drop_eager_tasks()
-        worker.take_node(node)
-        worker.show_activity()
-        self._lifecycle.carry(worker)
-        worker.lifecycle.wait_to_take_part()
-        await self._hook(worker, node_lifecycle.set_up)
-
     def _take_effect(self, edit: _Following) -> None:
-        """From one moment to the next the run is another."""
+        """Change the plan, and tell everything that depends on it. Nothing in here waits."""
         engine, how = self._engine, edit.how
         assert self._index is not None
         new, nodes = apply(engine.core, self._index, self._graph, how, edit.come, engine.groups)
@@ -389,7 +295,7 @@ class Edits:
                     core.trace_changes(ParameterSet(core.now(), here.path, change.name, change.after))
 
     def _switched(self, changes: Sequence[Change]) -> _Switched:
-        """The nodes, then the subgraphs, that are enabled or disabled, and which of both in the end."""
+        """Return the nodes, then the subgraphs, that are enabled or disabled, and which of the two in the end."""
         if not any(isinstance(change, OptionsChange) for change in changes):
             return {}
         assert self._index is not None
@@ -408,7 +314,7 @@ class Edits:
         return dict(sorted(found.items(), key=lambda one: one[0].scope is not None))
 
     def _to_start_afresh(self, switched: _Switched) -> list[RunningNode]:
-        """Whom to tear down and set up before they are enabled (F10), so that it all takes effect at one moment."""
+        """Return the nodes to tear down and set up before they are enabled (F10): all takes effect at one moment."""
         on = {worker for worker, enabled in switched.items() if enabled}
         scopes = {worker.scope for worker in on}
         inside = {member for scope in scopes if scope is not None for member in scope.members}
@@ -433,36 +339,9 @@ class Edits:
         if worker.options is not None:
             worker.set_options(msgspec.structs.replace(worker.options, enabled=enabled))
 
-    async def leave(self, gone: list[RunningNode]) -> None:
-        """Nodes that are gone are torn down, also if nobody waits for that any more."""
-        if not gone:
-            return
-        task = asyncio.create_task(self._tear_down(gone), name="hfg edit")
-        self._lifecycle.leaving.add(task)
-        task.add_done_callback(self._lifecycle.leaving.discard)
-        await asyncio.shield(task)
-
-    async def _tear_down(self, workers: Iterable[RunningNode]) -> None:
-        """Let nodes that are gone close what they have opened; if that fails, it is told with other errors (X3)."""
-        engine = self._engine
-        for worker in workers:
-            worker.cancel_timers()
-        for worker in workers:
-            try:
-                await self._hook(worker, node_lifecycle.tear_down)
-            except HfgError as error:
-                engine.core.errors.append(error)
-            engine_ports.release_ports(worker)
-            self._lifecycle.forget(worker)
-            if worker.execution.eager_task is not None:
-                worker.execution.eager_task.drop()
-            if worker.concurrent is not None:
-                concurrency.abandon(worker)
-                worker.concurrent.drop_eager_tasks()
-
 
 def _take_values(edit: _Following) -> None:
-    """A copy has the values that its model has as the edit takes effect, if they were set since it was asked for."""
+    """Give a copy the values that the copied node has when the edit takes effect, if they were set since."""
     said = {(change.node, change.name) for change in edit.changes if isinstance(change, ParameterChange)}
     for change, before in edit.copied:
         for name, value in change.source._parameters.items():
@@ -479,11 +358,7 @@ def _stay_disabled(fresh: Iterable[RunningNode]) -> None:
 
 
 def _refuse_for_good(change: Change) -> None:
-    """Refuse what a run has from beginning to end: its groups, the ports of the whole, what an edge holds.
-
-    Raises:
-      GraphError: it is such a change.
-    """
+    """Refuse to change what stays for a whole run: groups, ports of the graph, and how an edge holds tokens."""
     if isinstance(change, PortChange):
         raise GraphError(
             f'the ports of a graph that runs stay as they are, and "{change.port.name}" is one; '
@@ -508,7 +383,7 @@ def _refuse_for_good(change: Change) -> None:
 
 
 def _is_to_begin(worker: RunningNode, on: Collection[RunningNode], scopes: Set[Scope | None]) -> bool:
-    """Whether it is off and will be on, with all around it (F10); in a back-off it is set up when that is over."""
+    """Return whether a node is disabled and will be enabled (F10); one that is backing off is set up after that."""
     if not worker.blocked & DISABLED or worker.blocked & BACKOFF:
         return False
     meant = worker in on or (worker.own_enabled and not scopes.isdisjoint(worker.around))
@@ -516,7 +391,7 @@ def _is_to_begin(worker: RunningNode, on: Collection[RunningNode], scopes: Set[S
 
 
 def _told(commands: Sequence[Command]) -> str:
-    """What the trace says; a parameter may have a value that is no data, an array, and is shown then."""
+    """Return the text for the trace; values that are not data, such as arrays, are shown."""
     try:
         return encode(commands)
     except GraphError:

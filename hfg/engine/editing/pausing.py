@@ -1,7 +1,7 @@
-"""Holding a run still: pause, one step of one node, one wave, breakpoints (rule R3).
+"""Pausing a run: pause, one step of one node, one wave, breakpoints (rule R3).
 
-While the run is paused nothing is taken from the run queues; what is under way goes on to its end, timers ring and
-tokens stay where they are. Stands on `places` and `quiescence`.
+While the run is paused nothing is taken from the run queues. Firings in progress end, timers ring, and tokens stay
+where they are.
 """
 
 from __future__ import annotations
@@ -11,10 +11,9 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, Protocol
 
-import msgspec
-
 from hfg.base.logs import Log
 from hfg.base.token import Token
+from hfg.engine.editing.breakpoints import Breakpoint, Step
 from hfg.engine.model.running_node import NO_CALLS, RunningNode
 from hfg.engine.rules import iterating, quiescence
 from hfg.engine.runtime.callbacks import Edited
@@ -23,71 +22,20 @@ from hfg.engine.runtime.places import behind, edges_at, is_gone, is_near, place_
 from hfg.errors import UsageError
 from hfg.trace import RunPaused, RunResumed, TokenSent, TraceEvent
 
-__all__ = ["Breakpoint", "Pausing", "Step"]
+__all__ = ["Pausing"]
 
 _LOGGER = Log("hfg.engine")
 
 
 class _Trace(Protocol):
-    """Where a breakpoint on an edge looks at tokens: the consumers of the run's trace."""
+    """The consumers of the run's trace, among which a breakpoint on an edge receives tokens."""
 
     def add(self, consumer: Callable[[TraceEvent], None]) -> Callable[[], None]:
-        """Let a function see every event from now on; gives back what removes it."""
-
-
-class Step(msgspec.Struct, frozen=True):
-    """What one step did.
-
-    Attributes:
-      moved: paths of the nodes that fired or were called, in order; a node of a wave may be there twice.
-      why_not: why nothing moved: what the node waits for; "" if something did.
-    """
-
-    moved: tuple[str, ...]
-    why_not: str = ""
-
-
-class Breakpoint:
-    """Pauses the run; made by `Run.break_at`.
-
-    Attributes:
-      path: the node before whose firings and calls the run pauses, or the edge or port on which tokens are looked at;
-        as it is called now.
-      hits: how often it has paused the run.
-      token: the token that it saw last; None for a node.
-    """
-
-    def __init__(self, place: Any, path: str, remove: Callable[[Breakpoint], None]) -> None:
-        self.path = path
-        self.place = place
-        self.hits = 0
-        self.token: Token[Any] | None = None
-        self._remove = remove
-
-    def remove(self) -> None:
-        """It pauses the run no more; a run that it has paused stays so. Does nothing the second time."""
-        self._remove(self)
-
-    def was_hit(self, token: Token[Any] | None = None) -> None:
-        """It has paused the run, on that token if it looks at tokens."""
-        self.hits += 1
-        if token is not None:
-            self.token = token
-
-    def follow(self, place: Any) -> None:
-        """What it stands at was put in place of what it stood at (R4)."""
-        self.place = place
-
-    def rename(self, path: str) -> None:
-        """What it stands at is called otherwise."""
-        self.path = path
-
-    def __repr__(self) -> str:
-        return f'<Breakpoint at "{self.path}", {self.hits} hits>'
+        """Let a function receive every event from now on; return what removes it."""
 
 
 class Pausing:
-    """The part of the engine that may hold everything still.
+    """The part of the engine that can pause everything.
 
     Attributes:
       paused: no new firing or call starts.
@@ -101,11 +49,11 @@ class Pausing:
         self.why = ""
         self._on_hit: Callable[[Breakpoint], None] = lambda _: None
         self._stepping = False
-        self._waiters: list[asyncio.Future[None]] = []  # for a pause, or for what is under way to be over
+        self._waiters: list[asyncio.Future[None]] = []  # for a pause, or for the end of a step
         self._at_nodes: dict[RunningNode, Breakpoint] = {}
         self._at_edges: dict[Breakpoint, Callable[[], None]] = {}
         self._labels_at: dict[Breakpoint, frozenset[str]] = {}
-        self._waived: set[RunningNode] = set()  # stopped here already: goes on when the run does
+        self._waived: set[RunningNode] = set()  # stopped here already: continues with the run
         engine.callbacks.rested.append(self._rest)
         engine.callbacks.finished.append(self._rest)
         engine.callbacks.edited.append(self._find_again)
@@ -125,15 +73,15 @@ class Pausing:
         self._rest()
 
     def resume(self) -> None:
-        """Go on. Does nothing if the run is not paused.
+        """Continue. Does nothing if the run is not paused.
 
         Raises:
-          UsageError: a step is under way.
+          UsageError: a step is in progress.
         """
         if not self.paused:
             return
         if self._stepping:
-            raise UsageError("a step is under way: await it before run.resume()")
+            raise UsageError("a step is in progress: await it before run.resume()")
         engine = self._engine
         self.paused, self.why = False, ""
         self._pause_groups(False)
@@ -147,7 +95,7 @@ class Pausing:
             group.pause(paused)
 
     def _rest(self) -> None:
-        """The pump would go on now: tell those who wait for the pause, or for the end of what is under way."""
+        """Wake those who wait for the pause, or for the end of a step: the engine would continue now."""
         waiters, self._waiters = self._waiters, []
         for waiter in waiters:
             if not waiter.done():
@@ -159,7 +107,7 @@ class Pausing:
         await waiter
 
     async def wait_paused(self) -> str:
-        """Wait until the run is paused and nothing is under way any more; gives back why it was paused.
+        """Wait until the run is paused and nothing is in progress; return why it was paused.
 
         Raises:
           UsageError: the run has ended.
@@ -169,7 +117,7 @@ class Pausing:
             if self.paused and not self._engine.core.in_flight and not self._stepping:
                 return self.why
             await self._change()
-        raise UsageError("the run has ended: nothing can pause it any more")
+        raise UsageError("cannot pause: the run has ended")
 
     # --- steps ------------------------------------------------------------------------------------------------------
 
@@ -190,7 +138,7 @@ class Pausing:
         return Step((worker.path,))
 
     async def wave(self) -> Step:
-        """Let each node make at most one firing and one call, those that become enabled by that included."""
+        """Let each node make at most one firing and one call, including nodes that become enabled by that."""
         self._begin("a wave")
         moved: list[str] = []
         done: set[tuple[RunningNode, str]] = set()
@@ -213,42 +161,42 @@ class Pausing:
         return Step(tuple(moved), "" if moved else "no node can move")
 
     def _next_in_wave(self, done: set[tuple[RunningNode, str]]) -> RunningNode | None:
-        """Who moves next in a wave in which these have moved already.
+        """Return the node that moves next in a wave in which these have already moved.
 
-        They stay in their queues, for what they do next may change: who fired may be called.
+        Nodes stay in their queues, because what they do next may change: a node that has fired may be called.
         """
         for worker in [worker for worker in self._queued() if not worker.is_boundary_output]:
             kind = _next_kind(worker)
             if not kind:
-                self._let(worker)  # what it was queued for is gone: it leaves the queue, so that it can be queued again
+                self._let(worker)  # its reason is gone: it leaves the queue, so that it can be queued again
             elif (worker, kind) not in done:
                 return worker
         return None
 
     def _let_elements_in(self) -> bool:
-        """What iterates lets the next element in by itself where it is quiet inside, for that is no firing (G4).
+        """Let subgraphs that iterate and are quiet inside take their next element, which is not a firing (G4).
 
-        Whether there was any, or something came out.
+        Return whether one did, or something came out of one.
         """
         went_on = False
         while True:
             readers = [worker for worker in self._queued() if worker.is_boundary_output]
-            for reader in readers:  # what comes out is read by nobody who could be paused
+            for reader in readers:  # outputs are read by the engine, which is not paused
                 self._let(reader)
             if not iterating.settle(self._engine.core) and not readers:
                 return went_on
             went_on = True
 
     def need_still(self, what: str) -> None:
-        """Refuse to step a run that is not held still.
+        """Refuse to step a run that is not paused.
 
         Raises:
-          UsageError: it has ended, goes on, or makes a step already.
+          UsageError: it has ended, is running, or is already making a step.
         """
         if self._engine.core.over:
             raise UsageError(f"{what} cannot step: the run has ended")
         if not self.paused:
-            raise UsageError(f"{what} cannot step while the run goes on: run.pause() first")
+            raise UsageError(f"{what} cannot step while the run is not paused: run.pause() first")
         if self._stepping:
             raise UsageError(f"{what} cannot step while another step is under way: await that first")
 
@@ -259,7 +207,7 @@ class Pausing:
             region.dissolve()
 
     def _queued(self) -> Iterator[RunningNode]:
-        """Those that could move now, group by group."""
+        """Yield the nodes that could move now, group by group."""
         for group in self._engine.groups.values():
             if not group.full:
                 yield from list(group.policy)
@@ -268,13 +216,13 @@ class Pausing:
         if worker.busy:
             return f'"{worker.path}" is in the middle of a {worker.busy}'
         if worker.group.full:
-            return f'group "{worker.group.name}" of "{worker.path}" is still at work'
+            return f'group "{worker.group.name}" of "{worker.path}" is still busy'
         if worker.queued and _next_kind(worker):
             return ""
         return f'"{worker.path}" {quiescence.waits_for(worker)}'
 
     def _let(self, worker: RunningNode) -> None:
-        """Make its next step, as the pump would."""
+        """Make the next step of a node, as the engine would."""
         engine = self._engine
         worker.group.policy.remove(worker)
         self._waived.add(worker)
@@ -289,11 +237,11 @@ class Pausing:
 
     @property
     def breakpoints(self) -> list[Breakpoint]:
-        """All that are set."""
+        """All breakpoints."""
         return [*self._at_nodes.values(), *self._at_edges]
 
     def when_hit(self, told: Callable[[Breakpoint], None]) -> None:
-        """Be told of breakpoints that have paused this part of a run, so that the others hold still too."""
+        """Call a function when a breakpoint has paused this process of a run, so that the others pause, too."""
         self._on_hit = told
 
     def break_at(self, place: Any, when: Callable[[Token[Any]], object] | None) -> Breakpoint:
@@ -324,10 +272,10 @@ class Pausing:
         return found
 
     def _at_edges_of(self, place: Any, when: Callable[[Token[Any]], object] | None) -> Breakpoint:
-        """Pause when a token is put on one of the edges, before anybody takes it.
+        """Pause when a token is put on one of the edges, before a node takes it.
 
         Raises:
-          UsageError: there is none.
+          UsageError: there is no edge.
         """
         labels = self._labels(place)
         if not labels:
@@ -354,7 +302,7 @@ class Pausing:
         return [edge.label for edge in edges_at(self._engine, place)]
 
     def _find_again(self, edited: Edited) -> None:
-        """The graph was edited: breakpoints are where they were; those at nodes that are gone are removed (R4)."""
+        """Keep breakpoints where they were after an edit; remove those at nodes that are gone (R4)."""
         near = {point for point in self.breakpoints if is_near(point.place, edited.nodes)}
         for point in near:
             point.follow(behind(point.place, edited.swapped))
@@ -373,7 +321,7 @@ class Pausing:
         point.rename(path)
 
     def remove(self, point: Breakpoint) -> None:
-        """Take a breakpoint away."""
+        """Remove a breakpoint."""
         stop_looking = self._at_edges.pop(point, None)
         if stop_looking is not None:
             stop_looking()
@@ -384,7 +332,7 @@ class Pausing:
             worker.halt_at(None)
 
     def _behind(self, point: Breakpoint, step: Callable[[RunningNode], None]) -> Callable[[RunningNode], None]:
-        """The step of a worker, behind its breakpoint."""
+        """Return the step of a node with a breakpoint before it."""
 
         def stop_first(worker: RunningNode) -> None:
             if worker in self._waived or worker.busy or not _next_kind(worker):
@@ -392,7 +340,7 @@ class Pausing:
                 step(worker)
                 return
             self._waived.add(worker)
-            worker.group.push(worker)  # it stands in the queue as before
+            worker.group.push(worker)  # back into the queue
             self._hit(point)
 
         return stop_first
@@ -408,7 +356,7 @@ def _path(place: Any, labels: Sequence[str]) -> str:
 
 
 def _any_works(workers: list[RunningNode]) -> bool:
-    """Whether a step of one of them will be over by itself; who waits for room in a queue (F8) may not be."""
+    """Return whether a step of one of them will end by itself; one that waits for room in a queue (F8) may not."""
     return any(
         (worker.busy or worker.has_concurrent_code()) and not worker.room.waiting and worker.iteration is None
         for worker in workers
@@ -416,7 +364,7 @@ def _any_works(workers: list[RunningNode]) -> bool:
 
 
 def _next_kind(worker: RunningNode) -> str:
-    """What a worker in a run queue would do; "" if what it was queued for is gone, or is no firing of a node."""
+    """Return what a node in a run queue would do; "" if the reason is gone, or it is not a firing of a node."""
     if worker.is_boundary_output:
         return ""
     calls = worker.calls

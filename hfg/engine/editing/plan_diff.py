@@ -1,18 +1,19 @@
-"""The diff of a plan: what an edit means to it, found by a look at what was touched alone (rules R4, G1).
+"""The diff of a plan: what an edit means to it, at a cost that depends on the edit only (rules R4, G1).
 
-What stays is told by identity: a node by its object, an edge by the ports at its ends, so that grouping nodes into a
-subgraph moves no token. Only nodes that a change names, and drawn edges that it names or that lie inside such a node,
-are looked at; the ways that lead over those edges are followed anew and compared with the running edges that did.
-Decides only; `applying` does it. Stands on `plan_index`.
+Nodes that stay are recognised by identity, edges by the ports at their ends, so that grouping nodes into a subgraph
+moves no token. Only nodes and declared edges that a change names, or that are inside such a node, are examined: the
+paths over those edges are followed again and compared with the running edges. Flattening the graph and comparing two
+plans would be simpler, but each edit would cost as much as a start. This module decides; `applying` changes the plan.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import msgspec
 
+from hfg.engine.editing.following import Follower, ends_of_running, kind_of_end
 from hfg.engine.editing.plan_index import PlanIndex
 from hfg.engine.model.running_node import RunningNode
 from hfg.graph import Graph
@@ -28,14 +29,13 @@ from hfg.graph.editing.changes import (
     PromotionChange,
     Renaming,
 )
-from hfg.graph.flat import ROOT, EdgeFollower, End, FlatEdge, FlatGraph
+from hfg.graph.flat import ROOT, FlatEdge
 from hfg.graph.structure.edge import Edge, is_feed, type_of
-from hfg.graph.structure.level import HasLevel, Level, inside, level_of
-from hfg.graph.structure.options import NodeOptions, in_group
-from hfg.graph.structure.places import edge_place, home_of, side_of
+from hfg.graph.structure.level import Level, inside, level_of
+from hfg.graph.structure.options import NodeOptions
+from hfg.graph.structure.places import edge_place, effective_options, home_of, is_attached, is_in, side_of
 from hfg.graph.structure.subgraph import is_box, iterated
 from hfg.ports import InnerSource, InnerTarget
-from hfg.ports.edges import BufferEdge
 from hfg.types import why_not
 
 __all__ = ["PlanDiff", "diff"]
@@ -44,22 +44,22 @@ _JOINED = ("input", "parameter")
 
 
 class PlanDiff(msgspec.Struct, eq=False):
-    """What is to be done to a plan.
+    """The changes of a plan.
 
     Attributes:
-      come: nodes that come, with their options; in any order.
-      gone: workers that go.
-      swapped: workers that get another node: the one they had, and the one that they get.
-      placed: workers of nodes that stay, which may be elsewhere in the order or in another subgraph.
-      options: workers of nodes that stay, with options that hold from now on.
-      renamed: workers of nodes and subgraphs whose path is another.
-      boxes_come, boxes_gone, boxes_placed: the same of subgraphs that are dissolved; those that go as workers.
-      old: the running edges that were looked at.
-      ways: what leads where they did, in order, each with the running edge that it is, if it is there already.
-      lost: running edges that go.
-      gates: whether they are to be set anew.
-      touched: workers that must not fire while it is done.
-      doubtful: only a check of the whole can tell whether the graph is sound.
+      come: new nodes with their options, in any order.
+      gone: workers of removed nodes.
+      swapped: workers that get another node, with the old and the new one.
+      placed: workers of nodes that stay, but may have another place in the order or another subgraph.
+      options: workers of nodes that stay, with their options from now on.
+      renamed: workers of nodes and subgraphs with another path.
+      boxes_come, boxes_gone, boxes_placed: the same for subgraphs that are dissolved.
+      old: the running edges that were examined.
+      ways: the edges that replace them, in order, each with the running edge that it continues, if any.
+      lost: running edges that end.
+      gates: gates must be set anew.
+      touched: workers that must not fire meanwhile.
+      doubtful: only a check of the whole graph can tell whether it is sound.
     """
 
     come: dict[Any, NodeOptions] = {}
@@ -80,13 +80,13 @@ class PlanDiff(msgspec.Struct, eq=False):
 
 
 def diff(graph: Graph, index: PlanIndex, changes: Sequence[Change]) -> PlanDiff:
-    """Find out what changes of the drawn graph mean to the plan of its run.
+    """Find what changes of the declared graph mean to the plan of its run.
 
     Args:
-      graph: as it was drawn, with the changes in it.
-      index: of the plan, which is as it was before them; nothing of it is changed but the order of its nodes, which
-        also holds without them.
-      changes: all since the plan was made or edited last.
+      graph: the declared graph, after the changes.
+      index: the index of the plan, before them. Only the order of its nodes is changed, to one that is also valid
+        without the changes.
+      changes: all changes since the plan was made or last edited.
     """
     comparing = _Comparing(graph, index, changes)
     comparing.nodes()
@@ -102,18 +102,18 @@ class _Comparing:
         self.index = index
         self.changes = changes
         self.found = PlanDiff()
-        self.swaps: dict[Any, RunningNode | None] = {}  # by the node of now: the worker that had another; None: not now
+        self.swaps: dict[Any, RunningNode | None] = {}  # by node: the worker that takes it over; None: no longer
         self.insides: list[Level] = []  # of subgraphs that came, went or moved
-        self.follower = _Follower(graph)
+        self.follower = Follower(graph)
 
     # --- nodes
 
     def worker_of(self, node: Any) -> RunningNode | None:
-        """The worker that a node has, or takes over."""
+        """Return the worker that a node has, or takes over."""
         return self.swaps[node] if node in self.swaps else self.index.by_node.get(node)
 
     def nodes(self) -> None:
-        """Look at the nodes that changes name, and at all inside them."""
+        """Compare the nodes that changes name, and all inside them."""
         found = self.found
         swapped: dict[RunningNode, Any] = {}
         placed: dict[Any, None] = {}
@@ -125,7 +125,7 @@ class _Comparing:
                 if worker is not None:
                     swapped[worker] = change.new
                 if change.old in placed:
-                    placed[change.new] = None  # whose place it takes had been moved before
+                    placed[change.new] = None  # the replaced node had moved before
                 told |= {change.old: None, change.new: None}
             elif isinstance(change, NodeChange):
                 placed |= dict.fromkeys(self._within(change.node, change.inside, self.insides))
@@ -144,7 +144,7 @@ class _Comparing:
         found.gates = any(isinstance(change, GateChange) for change in self.changes)
 
     def _within(self, node: Any, was: Level | None, levels: list[Level] | None) -> Iterator[Any]:
-        """A node and all inside it; notes the levels inside."""
+        """Yield a node and all inside it; add the inner levels to `levels`."""
         waiting = [(node, was)]
         while waiting:
             one, was = waiting.pop()
@@ -161,13 +161,13 @@ class _Comparing:
         return not is_box(node) or bool(iterated(node)) or (worker is not None and worker.scope is None)
 
     def _compare_node(self, node: Any, *, moved: bool) -> None:
-        found, worker, stays = self.found, self.worker_of(node), _is_in(node, self.graph)
+        found, worker, stays = self.found, self.worker_of(node), is_in(node, self.graph)
         leaf = self._is_leaf(node)
         if not stays:
             if worker is not None:
                 (found.gone if leaf else found.boxes_gone).append(worker)
             return
-        options = _options_of(node)
+        options = effective_options(node)
         self.found.doubtful |= options.group is not None and options.group not in self.graph.groups
         if worker is None:
             found.doubtful |= node._type.is_source and side_of(level_of(node._place.graph)).owner is not None
@@ -183,7 +183,7 @@ class _Comparing:
     # --- edges
 
     def edges(self) -> None:
-        """Look at the drawn edges that were touched, and follow all ways that lead over them."""
+        """Follow all paths over the declared edges that were touched."""
         index, found = self.index, self.found
         homes, before, rubbed_out = self._touched_edges()
         affected: dict[Any, None] = {}
@@ -203,7 +203,7 @@ class _Comparing:
         present: dict[Any, list[Any]] = {}
         for running in found.old:
             if rubbed_out.isdisjoint(running.segments):
-                present.setdefault(_ends_of_running(running), []).append(running)
+                present.setdefault(ends_of_running(running), []).append(running)
         in_order = sorted(begins, key=lambda begin: edge_place(homes.get(begin) or home_of(begin, self.graph), begin))
         kept = set()
         for begin in in_order:
@@ -215,9 +215,9 @@ class _Comparing:
         found.lost = [running for running in found.old if running not in kept]
 
     def _touched_edges(self) -> tuple[dict[Edge, Level | None], dict[Edge, Edge], set[Edge]]:
-        """The edges that changes draw or delete, and the graph each is in now.
+        """Return the edges that changes declare or delete, with the level where each is now.
 
-        With it: which edge one stands for, and which were deleted for good.
+        Return also which edge one replaces, and which were deleted for good.
         """
         homes: dict[Edge, Level | None] = {}
         before: dict[Edge, Edge] = {}
@@ -235,7 +235,7 @@ class _Comparing:
                 mentioned += self._edges_of_promoted(change)
         mentioned += [(level, edge) for level in self.insides for edge in level.edges]
         for level, edge in mentioned:
-            is_there = _is_attached(level, self.graph) and edge in level.connections.order
+            is_there = is_attached(level, self.graph) and edge in level.connections.order
             homes[edge] = level if is_there else homes.get(edge)
         for edge, home in homes.items():
             if home is not None and edge not in home.connections.order:
@@ -243,7 +243,7 @@ class _Comparing:
         return homes, before, rubbed_out
 
     def _edges_of_promoted(self, change: PromotionChange) -> Iterator[tuple[Level, Edge]]:
-        """The edges at parameters of the subgraph, and of those around it, that stand for others than before."""
+        """Yield the edges at parameters, of the subgraph and of those around it, that stand for others than before."""
         names = [
             name for name in {**change.before, **change.after} if change.before.get(name) != change.after.get(name)
         ]
@@ -262,24 +262,24 @@ class _Comparing:
                     waiting.append(around.owner.ports.parameters[name])
 
     def _ends_of(self, way: FlatEdge) -> tuple[Any, ...]:
-        roomy = bool(way.options.initial or way.options.buffer) and not way.is_event_edge  # another kind of edge
+        roomy = bool(way.options.initial or way.options.buffer) and not way.is_event_edge  # another class of edge
         source, target = way.source, way.target
         begin, end = self._of_node(source.port) or source.port, self._of_node(target.port) or target.port
-        return begin, _kind(source.port), source.name, end, _kind(target.port), target.name, roomy
+        return begin, kind_of_end(source.port), source.name, end, kind_of_end(target.port), target.name, roomy
 
     def _of_node(self, port: Any) -> RunningNode | None:
-        """The worker of a port's node; that of a port's inner side is known by the port alone (G4)."""
+        """Return the worker of a port's node; the inner side of a port has none, and stands for itself (G4)."""
         node = getattr(port, "node", None)
         return None if node is None or isinstance(port, InnerSource | InnerTarget) else self.worker_of(node)
 
     # --- soundness
 
     def judge(self) -> None:
-        """See whether the graph is sound beyond doubt; else a check of the whole is to say what is wrong (R4)."""
+        """Find whether the graph is certainly sound; otherwise a check of the whole graph decides (R4)."""
         found = self.found
         changes = [(way, old) for way, old in found.ways if old is None or old.segments != way.segments]
         changed = [way for way, _ in changes]
-        closes_a_ring = self._closes_a_ring()  # asked in any case, for the index learns by that
+        closes_a_ring = self._closes_a_ring()  # always called: the index learns from it
         found.doubtful = (
             found.doubtful
             or closes_a_ring
@@ -292,16 +292,16 @@ class _Comparing:
         )
 
     def _is_concurrency_touched(self, changed: Sequence[FlatEdge]) -> bool:
-        """Whether a node that has several firings under way comes, or gets what it cannot have with that (F14)."""
+        """Return whether a node with concurrent firings comes, or gets something it cannot have with them (F14)."""
         found = self.found
         options = [*found.come.values(), *(options for _, options in found.options)]
-        options += [_options_of(node) for _, _, node in found.swapped]
+        options += [effective_options(node) for _, _, node in found.swapped]
         ends = [end.port for way in changed if way.active for end in (way.source, way.target)]
         options += [getattr(getattr(port, "node", None), "_options", None) or NodeOptions() for port in ends]
         return any(one.concurrency > 1 for one in options)
 
     def _closes_a_ring(self) -> bool:
-        """Whether new edges make a ring of synchronous ones without a delay (P7)."""
+        """Return whether new edges close a cycle of synchronous edges without a delay (P7)."""
         joined = [
             (self._old_node(way.source.port), self._old_node(way.target.port))
             for way, running in self.found.ways
@@ -311,20 +311,20 @@ class _Comparing:
         return self.index.order.closes_a_ring(joined, self.found.lost)
 
     def _waits_in_thread(self) -> bool:
-        """Whether async code would be in a group that is a thread."""
+        """Return whether async code would be in a group that is a thread."""
         found = self.found
         threads = {name for name, group in self.graph.groups.items() if group.threads}
         nodes = [*found.come.items(), *((worker.node, options) for worker, options in found.options)]
-        nodes += [(node, _options_of(node)) for _, _, node in found.swapped]
+        nodes += [(node, effective_options(node)) for _, _, node in found.swapped]
         return any(options.group in threads and _may_wait(node._type) for node, options in nodes)
 
     def _old_node(self, port: Any) -> Any:
-        """The node by which the index knows a worker."""
+        """Return the node by which the index knows a worker."""
         worker = self._of_node(port)
         return port.node if worker is None else worker.node
 
     def _fits(self, way: FlatEdge) -> bool:
-        """Whether the parts of an edge through subgraphs make a sound one beyond doubt."""
+        """Return whether the parts of an edge through subgraphs certainly make a sound edge."""
         source, target = way.source.port, way.target.port
         if iterated(getattr(target, "node", None)) and way.target.kind != "slot" and (way.active or way.is_event_edge):
             return False
@@ -339,9 +339,9 @@ class _Comparing:
         )
 
     def _are_doubled(self, changes: Sequence[tuple[FlatEdge, Any]]) -> bool:
-        """Whether an input may have two edges, or two ports be connected twice (P2)."""
+        """Return whether an input may have two edges, or two ports be connected twice (P2)."""
         into = set()
-        moved = {*self.found.lost, *(running for _, running in changes)}  # all others stay where they are
+        moved = {*self.found.lost, *(running for _, running in changes)}  # all others stay
         for way, _ in changes:
             source, target = way.source.port, way.target.port
             alone = way.target.kind in _JOINED
@@ -358,7 +358,7 @@ class _Comparing:
         return False
 
     def _at_border(self, port: InnerTarget[Any]) -> RunningNode | None:
-        """Who reads what comes out of a subgraph that iterates, if anybody does."""
+        """Return the reader of an output of a subgraph that iterates, if it has one."""
         box = self.worker_of(port.node)
         readers = () if box is None or box.iteration is None else box.iteration.readers
         return next((reader for reader in readers if reader.port_name == port.name), None)
@@ -366,7 +366,7 @@ class _Comparing:
     # --- who must rest
 
     def touch(self) -> None:
-        """Find who must not fire while it is done."""
+        """Find the workers that must not fire meanwhile."""
         found = self.found
         touched: dict[RunningNode | None, None] = {}
         for way, running in found.ways:
@@ -387,154 +387,6 @@ class _Comparing:
 
 
 def _may_wait(kind: Any) -> bool:
-    """Whether there is async code in nodes of a type."""
+    """Return whether nodes of a type have async code."""
     waits = kind.process_kind.startswith("async") or "do" in kind.hooks
     return waits or any(slot.is_async for slot in kind.slots.values())
-
-
-def _ends_of_running(edge: Any) -> tuple[Any, ...]:
-    """What makes an edge the same: nodes and names of ports; the graph's own ports and observables are themselves."""
-    begin = edge.source if edge.source.node is not None else edge.source_port
-    end = edge.target if edge.target.node is not None else edge.target_port
-    source, target = edge.source_port, edge.target_port
-    name = "observable" if is_feed(source) else source.name
-    return begin, _kind(source), name, end, _kind(target), target.name, type(edge) is BufferEdge
-
-
-def _kind(port: Any) -> str:
-    return "observable" if is_feed(port) else str(port.kind)
-
-
-def _is_in(node: Any, graph: Graph) -> bool:
-    """Whether a node is in the whole graph, alone or with subgraphs around it."""
-    return node._place is not None and _is_attached(level_of(node._place.graph), graph)
-
-
-def _is_attached(level: Level, graph: Graph) -> bool:
-    """Whether a level is part of the whole now."""
-    root, one = level_of(graph), level
-    while one is not root:
-        if one.owner is None or inside(one.owner) is not one:
-            return False
-        around = one.around
-        if around is None:
-            return False
-        one = around
-    return True
-
-
-def _options_of(node: Any) -> NodeOptions:
-    """What is said about a node, with the group it really runs in."""
-    own: NodeOptions = node._options
-    group, level = own.group, level_of(node._place.graph)
-    while group is None and level.owner is not None:
-        group = level.owner._options.group
-        level = level_of(level.owner.place.graph)
-    return own if own.group is not None else in_group(own, group or "loop")
-
-
-# --- following drawn edges ---
-
-
-class _Dissolved(Mapping[Any, Any]):
-    """Says of any node whether it is a subgraph that is dissolved; each stands for itself."""
-
-    def __contains__(self, node: object) -> bool:
-        return is_box(node) and not iterated(node)
-
-    def __getitem__(self, node: Any) -> Any:
-        if node not in self:
-            raise KeyError(node)
-        return node
-
-    def __bool__(self) -> bool:
-        return True
-
-    def __iter__(self) -> Iterator[Any]:
-        return iter(())
-
-    def __len__(self) -> int:
-        return 0
-
-
-class _Follower(EdgeFollower):
-    """Follows single edges; looks only at the graphs on their way.
-
-    The numbers of nodes in what it gives mean nothing: `via` holds subgraphs, and a node is known by its port.
-    """
-
-    def __init__(self, graph: Graph) -> None:
-        super().__init__(FlatGraph([], [], [], graph.groups, [], graph, []), [])
-        self.scope_of = _Dissolved()
-
-    def begins(self, edge: Edge) -> Iterator[Edge]:
-        """Give the drawn edges with which the ways over one begin."""
-        waiting, seen = [edge], {edge}
-        while waiting:
-            one = waiting.pop()
-            relay = self.relay(one.source)
-            if relay is None:
-                yield one
-                continue
-            around = level_of(relay.graph if isinstance(one.source, InnerSource) else relay.node._graph)
-            for back in around.connections.at(relay.node):
-                if back not in seen and self.relay(back.target) is relay:
-                    seen.add(back)
-                    waiting.append(back)
-
-    def block(self, begin: Edge) -> list[FlatEdge]:
-        """Give the edges of the plan that begin with a drawn one, in order."""
-        self.flat.edges = []
-        self._look_ahead(begin)
-        self.begin(begin)
-        return self.flat.edges
-
-    def _look_ahead(self, begin: Edge) -> None:
-        """Find the relays on the way, and what goes on behind them."""
-        waiting = [begin]
-        self.depth_of[begin] = self._depth(begin)
-        while waiting:
-            relay = self.relay(waiting.pop().target)
-            if relay is None or relay in self.behind:
-                continue
-            onward = level_of(relay.node._graph if relay.kind in ("input", "slot") else relay.graph)
-            self.behind[relay] = [
-                edge for edge in onward.connections.at(relay.node) if self.relay(edge.source) is relay
-            ]
-            for edge in self.behind[relay]:
-                self.depth_of[edge] = self._depth(edge)
-            waiting += self.behind[relay]
-
-    def _depth(self, edge: Edge) -> int:
-        return home_of(edge, self.flat.graph).depth
-
-    def _make_end(self, port: Any) -> End | None:
-        if is_feed(port):
-            return End(ROOT, "observable", "observable", port)
-        if isinstance(port, InnerSource | InnerTarget):
-            return super()._make_end(port)
-        return End(ROOT if port.node is self.flat.graph else 0, port.kind, port.name, port)
-
-    def _finish(self, source: Any, target: Any, segments: tuple[Edge, ...], via: tuple[Any, ...]) -> None:
-        """An edge has both ends inside of the same subgraphs that iterate: nothing else crosses their borders (G4)."""
-        inside = {_side_of_port(port, self.flat.graph) for port in (source, target) if not is_feed(port)}
-        if len(inside) > 1:
-            self._report_border(target)
-        else:
-            super()._finish(source, target, segments, via)
-
-    def _label(self, source: End, target: End) -> str:
-        return f"{_end_path(source.port)} -> {_end_path(target.port)}"
-
-
-def _end_path(port: Any) -> str:
-    return "observable" if is_feed(port) else str(port.path)
-
-
-def _side_of_port(port: Any, graph: HasLevel) -> Level:
-    """On which side of the borders of what iterates a port is; the inner side of such a border is inside."""
-    if port.node is graph:
-        return level_of(graph)
-    level = inside(port.node) if isinstance(port, InnerSource | InnerTarget) else level_of(port.node._place.graph)
-    assert level is not None
-    return side_of(level)

@@ -1,7 +1,6 @@
-"""Finds the parts of a plan that an edit touches without a look at the rest (rule R4).
+"""Finds the parts of a plan that an edit touches, without a search (rule R4).
 
-Made when a run is edited for the first time, which is the one moment that costs by the size of the graph; every edit
-then keeps it true. Stands on `graph.structure.sequence` and the model.
+It is made when a run is first edited. That one edit costs more in a larger graph; every edit then updates the index.
 """
 
 from __future__ import annotations
@@ -20,16 +19,16 @@ _JOINED = ("input", "parameter")
 
 
 class PlanIndex:
-    """Where everything is in the plan of one run.
+    """Where nodes and edges are in the plan of one run.
 
     Attributes:
       by_node: the worker of each node, and of each subgraph that is dissolved.
       leaves: the workers of nodes in the order of the plan; the first part of `core.workers`.
-      scopes: the workers of subgraphs in that order; the part behind it.
-      edges: those between nodes; the first part of `core.edges`.
-      passing: the running edges that each drawn edge is part of.
+      scopes: the workers of subgraphs in that order; the next part.
+      edges: the edges between nodes; the first part of `core.edges`.
+      passing: the running edges that each declared edge is part of.
       labels: each edge by its label.
-      order: of nodes, along the synchronous edges.
+      order: an order of the nodes along synchronous edges.
     """
 
     def __init__(self, core: Core) -> None:
@@ -48,12 +47,12 @@ class PlanIndex:
         self.order = TopologicalOrder(self)
 
     def note(self, edge: Any) -> None:
-        """An edge consists of its segments."""
+        """Add an edge under its segments."""
         for segment in edge.segments:
             self.passing.setdefault(segment, []).append(edge)
 
     def forget(self, edge: Any) -> None:
-        """It does not any more."""
+        """Remove an edge from under its segments."""
         for segment in edge.segments:
             passing = self.passing[segment]
             passing.remove(edge)
@@ -61,26 +60,26 @@ class PlanIndex:
                 del self.passing[segment]
 
     def block(self, begin: Any) -> list[Any]:
-        """Give the running edges that begin with a drawn one, in order."""
+        """Return the running edges that begin with a declared one, in order."""
         return [edge for edge in self.passing.get(begin, ()) if edge.segments[0] is begin]
 
 
 class TopologicalOrder:
-    """Keeps nodes in an order along the synchronous edges without a delay, so that a ring shows where it closes (P7).
+    """Keeps nodes in an order along synchronous edges without a delay, so that an edge that closes a cycle shows (P7).
 
-    A new edge against the order moves only those between its ends that must be moved: who is behind its target or
-    before its source, whichever are fewer (the two-way search of Alpern and others, 1990).
+    A new edge against the order moves only nodes between its ends: those after its target or those before its source,
+    whichever are fewer (the two-way search of Alpern and others, 1990).
     """
 
     def __init__(self, index: PlanIndex) -> None:
         self._index = index
-        self._nodes: Sequence[Any] | None = None  # until somebody asks
-        self._come: dict[Any, list[Any]] = {}  # of the edit under way: who waits for a node, and for whom one waits
-        self._waits: dict[Any, list[Any]] = {}
+        self._nodes: Sequence[Any] | None = None  # made at the first question
+        self._come: dict[Any, list[Any]] = {}  # of the current edit: the nodes that wait for a node, and
+        self._waits: dict[Any, list[Any]] = {}  # the nodes that a node waits for
         self._lost: set[Any] = set()
 
     def closes_a_ring(self, new: Iterable[tuple[Any, Any]], lost: Iterable[Any]) -> bool:
-        """Take in new edges, as pairs of nodes, while others go; says whether they make a ring."""
+        """Add new edges, as pairs of nodes, while others go; return whether they close a cycle."""
         pairs = list(new)
         if not pairs:
             return False
@@ -101,18 +100,18 @@ class TopologicalOrder:
         return False
 
     def forget(self, node: Any) -> None:
-        """A node is gone."""
+        """Remove a node."""
         if self._nodes is not None and node in self._nodes:
             self._nodes.remove(node)
 
     def swap(self, old: Any, new: Any) -> None:
-        """A node has taken the place of another."""
+        """Put a node in the place of another."""
         if self._nodes is not None and old in self._nodes:
             self.forget(new)
             self._nodes.replace(old, new)
 
     def _take_in(self, nodes: Sequence[Any], source: Any, target: Any) -> bool:
-        """Let a node come before another; whether that can be."""
+        """Let a node come before another; return whether that is possible."""
         if source is target:
             return False
         last, first = nodes.label(source), nodes.label(target)
@@ -130,7 +129,7 @@ class TopologicalOrder:
         return True
 
     def _move(self, nodes: Sequence[Any], moved: set[Any], beside: Any, offset: int) -> None:
-        """Put nodes directly behind or in front of another, in the order they have."""
+        """Put nodes directly after or before another, in their present order."""
         in_order = sorted(moved, key=nodes.label)
         for node in in_order:
             nodes.remove(node)
@@ -167,7 +166,7 @@ class TopologicalOrder:
         return self._nodes
 
     def _sorted(self) -> list[Any]:
-        """All nodes, each behind those whose outputs it takes."""
+        """Return all nodes, each after those whose outputs it takes (Kahn, 1962)."""
         left = {worker.node: len(self._before(worker.node)) for worker in self._index.leaves.items}
         ready = deque(node for node, count in left.items() if not count)
         found: list[Any] = []
@@ -182,7 +181,7 @@ class TopologicalOrder:
 
 
 class _Search:
-    """Goes from node to node as far as it may."""
+    """Visits nodes along edges, within a limit."""
 
     def __init__(self, begin: Any, onward: Callable[[Any], list[Any]], may: Callable[[Any], bool]) -> None:
         self.found = {begin}
@@ -191,11 +190,11 @@ class _Search:
         self._may = may
 
     def goes_on(self) -> bool:
-        """Whether there is more to look at."""
+        """Return whether there is more to visit."""
         return bool(self.waiting)
 
     def step(self, wanted: Any) -> bool:
-        """Look behind one node; whether what is wanted is there."""
+        """Visit one node; return whether an edge leads from it to the wanted one."""
         for node in self._onward(self.waiting.pop()):
             if node is wanted:
                 return True

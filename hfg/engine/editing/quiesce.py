@@ -1,8 +1,8 @@
-"""Holds nodes for an edit: as they come to rest, until it has taken effect or is given up (rule R4).
+"""Holds nodes for an edit: each when it becomes idle, until the edit has taken effect or is given up (rule R4).
 
-While the code of one of them waits until a queue has room, none is held: they may be the ones that make it. Those
-inside of a subgraph that iterates are held behind it, for its firing is over when they have come to rest (G4).
-Stands on `node_lifecycle`.
+While code of one of them waits for room in a queue, none is held: the others may be the ones that make room, and to
+hold them would be a deadlock. Nodes inside a subgraph that iterates are held after it, because its firing ends only
+when they are idle (G4).
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ __all__ = ["Quiesced"]
 
 
 class Quiesced:
-    """Holds nodes as they come to rest; inside the block all of them rest.
+    """Holds nodes when they become idle; inside the block all of them are idle.
 
     Attributes:
-      done: the edit has taken effect; else it was given up.
+      done: the edit has taken effect; otherwise it was given up.
     """
 
     def __init__(self, engine: Engine, workers: Sequence[RunningNode]) -> None:
         self._engine = engine
         self._workers = workers
-        self._held: dict[RunningNode, Callable[[], None]] = {}  # who rests, and what lets it go
+        self._held: dict[RunningNode, Callable[[], None]] = {}  # idle nodes, and what releases each
         self._wanted = frozenset(workers)
-        self._left = list(workers)  # who goes on until others rest, or until a queue has room
+        self._left = list(workers)  # not held until others are idle, or a queue has room
         self._waiter: asyncio.Future[None] = engine.loop.create_future()
         self._given_up = False
         self.done = False
-        self._said = False  # that it waits
-        self._counts = False  # among what is in flight
+        self._said = False  # the trace knows that the edit waits
+        self._counts = False  # the edit counts as work in flight
 
     async def __aenter__(self) -> Quiesced:
         engine = self._engine
@@ -56,14 +56,14 @@ class Quiesced:
         return self
 
     def _hold(self) -> None:
-        """Hold those who are left, as they come to rest, but for those inside of what has to rest first."""
+        """Hold the remaining nodes when they become idle, except those inside a subgraph that must be idle first."""
         for worker in [worker for worker in self._left if not self._is_amid(worker)]:
             if worker in self._left:
                 self._left.remove(worker)
                 node_lifecycle.when_idle(worker, self._rests, node_lifecycle.nothing)
 
     def _is_amid(self, worker: RunningNode) -> bool:
-        """Whether it is inside of something that iterates, is to be held too, and is not yet."""
+        """Return whether a node is inside an iterating subgraph that is still to be held."""
         around = worker.within
         while around is not None:
             if around.worker in self._wanted and around.worker not in self._held:
@@ -72,14 +72,14 @@ class Quiesced:
         return False
 
     def _say(self) -> None:
-        """Tell whoever traces who starts nothing any more until this is over."""
+        """Report to the trace which nodes start nothing until the edit is over."""
         core = self._engine.core
         if core.trace is not None:
             waiting = tuple(worker.path for worker in self._workers if worker not in self._left)
             core.trace(EditWaits(core.now(), waiting))
 
     def _rests(self, worker: RunningNode, over: Callable[[], None]) -> None:
-        """One of them has come to rest."""
+        """Hold a node that has become idle."""
         if self._given_up:
             over()
             return
@@ -94,7 +94,7 @@ class Quiesced:
             if self._said and len(self._held) < len(self._workers):
                 self._say()
         elif len(self._held) == len(self._workers):
-            if self._said:  # until we have our turn it is not quiet, or queues would grow (F8)
+            if self._said:  # the run is not quiet before the edit continues, or queues would grow (F8)
                 self._engine.core.begin_async()
                 self._counts = True
             answer(self._waiter, None)
@@ -103,7 +103,7 @@ class Quiesced:
         return any(worker.room.waiting for worker in self._workers)
 
     def look_for_room(self) -> None:
-        """Somebody's code begins or ceases to wait until a queue has room (F8)."""
+        """React to code that starts or stops waiting for room in a queue (F8)."""
         if self._given_up or self._waiter.done():
             return
         if self._is_room_awaited():
@@ -116,7 +116,7 @@ class Quiesced:
             self._hold()
 
     async def _or_end(self, waiter: asyncio.Future[None]) -> None:
-        """Wait until all rest, or the run is over."""
+        """Wait until all are idle, or the run is over."""
         engine = self._engine
         ending = asyncio.ensure_future(engine.ending.wait())
         try:
@@ -140,7 +140,7 @@ class Quiesced:
             core.trace(StructureChanged(core.now(), ""))
         for worker in self._workers if self.done else ():
             if not worker.blocked & REMOVED:
-                send_automatic(worker)  # what activity that went back has raised (A8, A9)
+                send_automatic(worker)  # automatic events of activity that was returned (A8, A9)
         held, self._held = self._held, {}
         for over in held.values():
             over()

@@ -1,7 +1,4 @@
-"""Parameters that are set from outside: between firings, and never without effect (rule P8).
-
-Stands on `node_lifecycle`.
-"""
+"""Parameters that are set from outside: between firings, and never without effect (rule P8)."""
 
 from __future__ import annotations
 
@@ -27,14 +24,14 @@ __all__ = ["need_settable", "refuse_without_effect", "set_parameter", "without_e
 
 
 def set_parameter(engine: Engine, port: ParameterPort[Any], value: Any) -> None:
-    """Set a parameter, and all those inside a subgraph that it stands for, each between firings of its node.
+    """Set a parameter, and the inner parameters that it stands for, each between firings of its node.
 
     Raises:
       ValueError: the value is out of the limits of one of them; nothing is changed.
-      UsageError: nobody would see it.
+      UsageError: it would have no effect.
     """
     reached = need_settable(engine, port, value)
-    value = own_copy(value)  # of now: it may be set a while later
+    value = own_copy(value)  # a copy of now, because it may be set later
     workers = {worker.node: worker for worker in engine.core.workers if worker.node is not None}
     if any(one.node not in workers for one in reached):
         raise UsageError(f'"{port.path}" is no parameter of this run: its graph is another one, or it was never added')
@@ -48,14 +45,17 @@ def set_parameter(engine: Engine, port: ParameterPort[Any], value: Any) -> None:
 
 
 def need_settable(engine: Engine, port: ParameterPort[Any], value: Any) -> list[ParameterPort[Any]]:
-    """Give a parameter and those inside that it stands for, all of which may have this value now.
+    """Return a parameter and the inner ones that it stands for, all of which may have this value now.
 
     Raises:
       ValueError: it is out of the limits of one of them, or set by the node alone.
       NotRunning: the run is over.
     """
     if engine.core.over:
-        raise NotRunning(f'the run is over: write node.ports.parameters["{port.name}"].value = ... for the next one')
+        raise NotRunning(
+            f"the run is over; to set the parameter for the next run, assign "
+            f'node.ports.parameters["{port.name}"].value = ...'
+        )
     reached = list(stands_for(port))
     for one in reached:
         if one.spec.read_only:
@@ -67,7 +67,7 @@ def need_settable(engine: Engine, port: ParameterPort[Any], value: Any) -> list[
 
 
 def _write(worker: RunningNode, node: Node, name: str, value: Any) -> None:
-    """Let the node work with the value from now on."""
+    """Give the node the value."""
     core = worker.core
     node._parameters[name] = own_copy(value)
     if core.trace_changes is not None:
@@ -75,7 +75,7 @@ def _write(worker: RunningNode, node: Node, name: str, value: Any) -> None:
 
 
 def _between_firings(worker: RunningNode, write: Callable[[], None]) -> None:
-    """Do it now, or as soon as the firing or call under way is over; nobody waits for that."""
+    """Write now, or when the current firing or call is over; the caller does not wait."""
     if worker.busy in BETWEEN_FIRINGS and not worker.is_on_fast_path():
         write()
         return
@@ -88,11 +88,11 @@ def _between_firings(worker: RunningNode, write: Callable[[], None]) -> None:
 
 
 def refuse_without_effect(parameters: Sequence[tuple[Any, str]], workers: Iterable[RunningNode]) -> None:
-    """Refuse a change that none of the code that runs would see.
+    """Refuse a change that no running code would see.
 
     Args:
-      parameters: nodes and subgraphs, with the names of what is to be set together.
-      workers: those that go on with what they do; not those that start afresh, with the new values.
+      parameters: nodes and subgraphs, with the names of the parameters that are set together.
+      workers: those that continue with what they do; not those that start over with the new values.
 
     Raises:
       UsageError: with the remedy.
@@ -112,7 +112,7 @@ def refuse_without_effect(parameters: Sequence[tuple[Any, str]], workers: Iterab
 
 
 def without_effect(node: Any, name: str) -> UsageError:
-    """The refusal to set what a generator function was given when it began."""
+    """Return the error for setting a parameter that a generator function received when it started."""
     return UsageError(
         f'parameter "{node.place.path}.{name}" belongs to a generator function that was given it when it '
         "began and cannot see a new value: make it a class whose process() yields, or counts in an "
@@ -121,9 +121,9 @@ def without_effect(node: Any, name: str) -> UsageError:
 
 
 def _has_its_values(worker: RunningNode) -> bool:
-    """Whether its code was given the parameters once and for all, and goes on with them."""
+    """Return whether its code has received the parameters once and continues with them."""
     if not worker.type.given_parameters_once or worker.blocked & (DISABLED | BACKOFF):
-        return False  # these begin afresh
+        return False  # these start over
     return worker.execution.generator is not None or worker.busy == "firing"
 
 

@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeVar, overload
 
 from hfg.base.hooks import hooks
 from hfg.base.token import Token
-from hfg.engine.editing.pausing import Breakpoint, Step
+from hfg.engine.editing.breakpoints import Breakpoint, Step
 from hfg.engine.editing.setting import set_parameter
 from hfg.engine.executing.code import answer
 from hfg.engine.face import outside

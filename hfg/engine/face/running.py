@@ -23,7 +23,7 @@ from hfg.engine.face.run import Run
 from hfg.engine.face.watching import watched
 from hfg.engine.observing.report import Report
 from hfg.engine.runtime.interrupt import CtrlC
-from hfg.engine.runtime.settings import Settings
+from hfg.engine.runtime.settings import RunFields, RunGiven, Settings
 from hfg.errors import CheckFailed, GraphError, HfgError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.checks import check_flat
@@ -32,7 +32,6 @@ from hfg.graph.flat import FlatGraph, flatten
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
 from hfg.graph.structure.option import declared, explaining
-from hfg.graph.structure.options import RunFields, RunGiven
 
 __all__ = ["run", "run_async", "running"]
 

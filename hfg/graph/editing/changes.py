@@ -1,8 +1,8 @@
 """What a command does to a graph, in steps that can each be taken back exactly (rule R4).
 
-A change holds the very nodes and edges, with their places in the order, so that what is undone is as it was. Whoever
-makes a change has checked it; doing it cannot fail. A run reads changes too, to see which edges are gone for good.
-Stands on `structure`.
+A change holds the nodes and edges themselves, with their places in the order, so that undoing restores the same objects
+at the same places: a run recognises them by identity, and keeps the tokens on them. A change was checked before it is
+made, so it cannot fail half-way. A run reads the changes, too, to see which edges are gone for good.
 """
 
 from __future__ import annotations
@@ -42,20 +42,32 @@ __all__ = [
 ]
 
 
+@dataclass(eq=False)
 class Change:
-    """One step."""
+    """One step.
+
+    It holds what is there before and after it, in pairs of fields, or whether something is `added`. So each step has
+    an inverse, which is of the same kind.
+    """
 
     def do(self) -> None:
-        """Take it."""
+        """Take the step."""
         raise NotImplementedError
 
     def inverse(self) -> Self:
-        """Give the step back."""
-        raise NotImplementedError
+        """Return the step that takes this one back."""
+        said = vars(self)
+        if "added" in said:
+            other: dict[str, Any] = {"added": not said["added"]}
+        elif "old" in said:
+            other = {"old": said["new"], "new": said["old"]}
+        else:
+            other = {"before": said["after"], "after": said["before"]}
+        return replace(self, **other)
 
 
 def undo_all(changes: Sequence[Change]) -> list[Change]:
-    """Take changes back, the last first; gives what was done for that."""
+    """Take changes back, the last first, and return the steps that did it."""
     done = [change.inverse() for change in reversed(changes)]
     for change in done:
         change.do()
@@ -98,10 +110,6 @@ class NodeChange(Change):
             leave(self.node)
             close_box(self.node)
 
-    @override
-    def inverse(self) -> Self:
-        return replace(self, added=not self.added)
-
 
 @dataclass(eq=False)
 class NodeSwap(Change):
@@ -118,10 +126,6 @@ class NodeSwap(Change):
         leave(self.old)
         settle(self.new, level, where.name, options)
 
-    @override
-    def inverse(self) -> Self:
-        return replace(self, old=self.new, new=self.old)
-
 
 @dataclass(eq=False)
 class Renaming(Change):
@@ -137,10 +141,6 @@ class Renaming(Change):
         level.members.rename(self.before, self.after)
         place(self.node, level, self.after)
 
-    @override
-    def inverse(self) -> Self:
-        return replace(self, before=self.after, after=self.before)
-
 
 @dataclass(eq=False)
 class OptionsChange(Change):
@@ -153,10 +153,6 @@ class OptionsChange(Change):
     @override
     def do(self) -> None:
         set_options(self.node, self.after)
-
-    @override
-    def inverse(self) -> Self:
-        return replace(self, before=self.after, after=self.before)
 
 
 @dataclass(eq=False)
@@ -171,10 +167,6 @@ class ParameterChange(Change):
     @override
     def do(self) -> None:
         write_parameter(self.node, self.name, self.after)
-
-    @override
-    def inverse(self) -> Self:
-        return replace(self, before=self.after, after=self.before)
 
 
 @dataclass(eq=False)
@@ -204,10 +196,6 @@ class EdgeChange(Change):
         else:
             self.level.connections.remove(self.position)
 
-    @override
-    def inverse(self) -> Self:
-        return replace(self, added=not self.added)
-
 
 @dataclass(eq=False)
 class EdgeSwap(Change):
@@ -220,10 +208,6 @@ class EdgeSwap(Change):
     @override
     def do(self) -> None:
         self.level.connections.swap(self.old, self.new)
-
-    @override
-    def inverse(self) -> Self:
-        return replace(self, old=self.new, new=self.old)
 
 
 @dataclass(eq=False)
@@ -241,10 +225,6 @@ class GateChange(Change):
             self.level.gates.insert(self.position, self.gate)
         else:
             self.level.gates.remove(self.position)
-
-    @override
-    def inverse(self) -> Self:
-        return replace(self, added=not self.added)
 
 
 @dataclass(eq=False)
@@ -275,10 +255,6 @@ class PromotionChange(Change):
     def do(self) -> None:
         self.level.promotions.become(self.after)
 
-    @override
-    def inverse(self) -> Self:
-        return replace(self, before=self.after, after=self.before)
-
 
 @dataclass(eq=False)
 class GroupsChange(Change):
@@ -292,10 +268,6 @@ class GroupsChange(Change):
     def do(self) -> None:
         self.groups.restore(self.after)
 
-    @override
-    def inverse(self) -> Self:
-        return replace(self, before=self.after, after=self.before)
-
 
 @dataclass(eq=False)
 class PortChange(Change):
@@ -308,10 +280,6 @@ class PortChange(Change):
     @override
     def do(self) -> None:
         self.level.ports.add(self.port) if self.added else self.level.ports.remove(self.port)
-
-    @override
-    def inverse(self) -> Self:
-        return replace(self, added=not self.added)
 
 
 @dataclass(eq=False)
@@ -329,7 +297,3 @@ class NotesChange(Change):
             self.notes[self.node] = self.after
         else:
             self.notes.pop(self.node, None)
-
-    @override
-    def inverse(self) -> Self:
-        return replace(self, before=self.after, after=self.before)

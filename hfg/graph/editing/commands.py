@@ -6,14 +6,13 @@ A command can be logged, sent over a wire and carried out again: `encode` and `d
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias, Unpack, cast
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, TypeAlias, Unpack
 
 import msgspec
+from typing_extensions import override
 
-from hfg.base.hooks import hooks
-from hfg.encoding import TAG
-from hfg.errors import GraphError
+from hfg.graph.editing.command import Command, decode, encode, read
 from hfg.graph.structure.option import add_unset
 from hfg.graph.structure.options import EdgeFields, EdgeGiven, GroupFields, GroupGiven, NodeGiven
 
@@ -23,7 +22,6 @@ __all__ = [
     "AddInput",
     "AddOutput",
     "AddSubgraph",
-    "AnyCommand",
     "ChangeGroup",
     "Command",
     "Connect",
@@ -59,35 +57,6 @@ else:
     NodeData: TypeAlias = dict[str, Any]  # they are checked when the node is added, with a message that names it
 
 
-class _Sentence(msgspec.StructMeta):
-    """Commands that are written wrongly say so as all of hfg does: which one, what it takes and what was found."""
-
-    if not TYPE_CHECKING:  # type checkers know it of the fields
-
-        def __call__(self, *values: object, **named: object) -> object:
-            try:
-                return super().__call__(*values, **named)
-            except TypeError as error:
-                words = str(error)
-                fields = [
-                    one.name if one.required else f"{one.name}=..." for one in msgspec.structs.fields(cast(Any, self))
-                ]
-                name = f"commands.{self.__name__}"
-                raise GraphError(f"{name}: {words[:1].lower()}{words[1:]}; write {name}({', '.join(fields)})") from None
-
-
-class Command(
-    msgspec.Struct,
-    metaclass=_Sentence,
-    frozen=True,
-    tag=True,
-    tag_field="do",
-    forbid_unknown_fields=True,
-    omit_defaults=True,
-):
-    """One edit. Paths are those of the whole graph: "fetch/go_to", "fetch/go_to.goal", "fetch.person.inner"."""
-
-
 class Add(Command, frozen=True):
     """Add a node.
 
@@ -100,8 +69,12 @@ class Add(Command, frozen=True):
 
     type: str
     path: str
-    parameters: dict[str, Any] = {}
-    options: NodeData = {}
+    parameters: dict[str, Any] = msgspec.field(default_factory=dict)
+    options: NodeData = msgspec.field(default_factory=dict)
+
+    @override
+    def references(self) -> Iterable[str]:
+        return (self.type,)
 
 
 class AddSubgraph(Command, frozen=True):
@@ -114,11 +87,15 @@ class AddSubgraph(Command, frozen=True):
     """
 
     path: str
-    inputs: dict[str, str] = {}
-    outputs: dict[str, str] = {}
-    events: dict[str, str] = {}
-    slots: dict[str, str] = {}
-    options: NodeData = {}
+    inputs: dict[str, str] = msgspec.field(default_factory=dict)
+    outputs: dict[str, str] = msgspec.field(default_factory=dict)
+    events: dict[str, str] = msgspec.field(default_factory=dict)
+    slots: dict[str, str] = msgspec.field(default_factory=dict)
+    options: NodeData = msgspec.field(default_factory=dict)
+
+    @override
+    def types(self) -> Iterable[str]:
+        return [text for ports in (self.inputs, self.outputs, self.events, self.slots) for text in ports.values()]
 
 
 class AddInput(Command, frozen=True):
@@ -127,12 +104,20 @@ class AddInput(Command, frozen=True):
     name: str
     type: str
 
+    @override
+    def types(self) -> Iterable[str]:
+        return (self.type,)
+
 
 class AddOutput(Command, frozen=True):
     """Declare a port at which the whole graph is read (rule P10); its type as a text."""
 
     name: str
     type: str
+
+    @override
+    def types(self) -> Iterable[str]:
+        return (self.type,)
 
 
 class AddGroup(Command, frozen=True):
@@ -221,6 +206,10 @@ class Connect(Command, EdgeSaid, frozen=True):  # type: ignore[misc]  # nobody c
 
         def __init__(self, source: str, target: str, **options: Unpack[EdgeGiven[Any, Operator]]) -> None: ...
 
+    @override
+    def references(self) -> Iterable[str]:
+        return [one.type for one in self.through]
+
 
 class Disconnect(Command, frozen=True):
     """Remove an edge."""
@@ -249,6 +238,10 @@ class SetEdge(Command, frozen=True):
 
     else:
         add_unset(EdgeSaid, locals())
+
+    @override
+    def references(self) -> Iterable[str]:
+        return [one.type for one in self.through] if isinstance(self.through, tuple) else ()
 
 
 class Enable(Command, frozen=True):
@@ -333,122 +326,8 @@ class Replace(Command, frozen=True):
 
     path: str
     type: str
-    parameters: dict[str, Any] = {}
+    parameters: dict[str, Any] = msgspec.field(default_factory=dict)
 
-
-AnyCommand: TypeAlias = (
-    Add
-    | AddSubgraph
-    | AddInput
-    | AddOutput
-    | AddGroup
-    | ChangeGroup
-    | RemoveGroup
-    | Remove
-    | Copy
-    | Rename
-    | Move
-    | Connect
-    | Disconnect
-    | MakeActive
-    | SetEdge
-    | Enable
-    | Disable
-    | Gate
-    | Ungate
-    | Promote
-    | SetParameter
-    | Note
-    | Enclose
-    | Dissolve
-    | Replace
-)
-
-_DECODER: msgspec.json.Decoder[list[AnyCommand]] = msgspec.json.Decoder(list[AnyCommand])
-
-
-def encode(commands: Iterable[Command]) -> str:
-    """Give commands as one line of JSON.
-
-    Raises:
-      GraphError: a value is no data.
-
-    Examples:
-      >>> encode([Connect("camera.out", "show.value", active=True)])
-      '[{"do":"Connect","source":"camera.out","target":"show.value","active":true}]'
-    """
-    listed = list(commands)
-    try:
-        return msgspec.json.encode(listed).decode()
-    except (TypeError, ValueError) as error:
-        raise GraphError(f"commands are plain data, and these hold something else: {error}") from error
-
-
-def decode(data: str | bytes, *, allow: Iterable[str] = ()) -> Sequence[AnyCommand]:
-    """Read commands that `encode` wrote, or somebody else.
-
-    They import what they name when they are applied. So they name only what a graph file may: modules of hfg, of
-    packages with node types, what is imported already, and what is allowed here.
-
-    Args:
-      data: one line of JSON.
-      allow: further packages whose code they may run.
-
-    Raises:
-      GraphError: it is no JSON, or no command, which the message says where; or they name another module.
-    """
-    commands = read(data)
-    references = [one for command in commands for one in _references(command)]
-    values = [one for command in commands for one in _in_values(command)]
-    types = [text for command in commands for text in _types(command)]
-    why = hooks.refusal(references, values, types, allow)
-    if why is not None:
-        raise GraphError(f"these commands are refused: {why}")
-    return commands
-
-
-def _references(command: AnyCommand) -> list[str]:
-    if isinstance(command, Add | Replace):
-        return [command.type]
-    if isinstance(command, Connect | SetEdge) and isinstance(command.through, tuple):
-        return [one.type for one in command.through]
-    return []
-
-
-def _in_values(command: AnyCommand) -> Iterator[str]:
-    """What values name that say their type: `{"$type": "my_robot.types:Pose", "value": ...}`."""
-    left = [msgspec.to_builtins(command)]
-    while left:
-        one = left.pop()
-        if isinstance(one, dict):
-            if TAG in one:
-                named = one.get("value") if one[TAG] == "reference" else one[TAG]
-                if isinstance(named, str) and ":" in named:
-                    yield named
-            left += one.values()
-        elif isinstance(one, list | tuple):
-            left += one
-
-
-def _types(command: AnyCommand) -> list[str]:
-    if isinstance(command, AddInput | AddOutput):
-        return [command.type]
-    if isinstance(command, AddSubgraph):
-        return [
-            text
-            for ports in (command.inputs, command.outputs, command.events, command.slots)
-            for text in ports.values()
-        ]
-    return []
-
-
-def read(data: str | bytes) -> Sequence[AnyCommand]:
-    """Read commands of somebody who may run any code here anyway.
-
-    Raises:
-      GraphError: it is no JSON, or no command; the message says where.
-    """
-    try:
-        return _DECODER.decode(data)
-    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-        raise GraphError(f"this is no list of commands: {error}") from error
+    @override
+    def references(self) -> Iterable[str]:
+        return (self.type,)

@@ -1,10 +1,9 @@
-"""The options of edges, nodes, groups and runs. This is the place to add one.
+"""The options of edges, nodes and groups. This is the place to add one; for a run, see `engine.runtime.settings`.
 
 Each is declared once, as a field with an `Option`: its type, default, limits, unit, meaning, who may have it and how a
 drawing shows it. What may be given in a call stands above it for type checkers, by name and type. Everything else is
 made of the declarations: commands, graph files and their schema, saving and loading, editing, grouping and cutting,
-labels in drawings, flags of `hfg run`, and the tables in docs/reference.md. For an option of a run, what it does is
-written in the engine, which finds it in its settings.
+labels in drawings, and the tables in docs/reference.md.
 
 Depends on `option`, not on nodes or ports.
 """
@@ -14,7 +13,6 @@ from __future__ import annotations
 import functools
 import os
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import Annotated, Any, Final, Generic, Literal, TypeAlias, TypedDict
 
 import msgspec
@@ -22,7 +20,6 @@ from typing_extensions import TypeVar
 
 from hfg.graph.structure.option import Fields, Option, documented
 from hfg.graph.structure.retrying import Errors
-from hfg.trace import Consumer
 
 __all__ = [
     "ACTIVE",
@@ -42,8 +39,6 @@ __all__ = [
     "Overflow",
     "Policy",
     "Release",
-    "RunFields",
-    "RunGiven",
     "in_group",
 ]
 
@@ -353,96 +348,6 @@ class GroupSpec(GroupFields, frozen=True):  # type: ignore[misc]
     """Where nodes run, and which of them comes first (rules R1, R2), checked."""
 
     name: str
-
-
-# --- runs ---
-
-
-class RunGiven(TypedDict, total=False):
-    """The options of a run."""
-
-    until_s: float | None
-    debug: bool
-    policy: str | None
-    seed: int | None
-    trace: Consumer | None
-    block_warning_s: float
-    fast: bool
-    watch: bool | str | None
-    settings: str | Path | None
-
-
-class RunFields(Fields[RunGiven], kw_only=True):
-    """How a run is done."""
-
-    until_s: Annotated[
-        float | None,
-        Option(
-            "End the run after this many seconds on its clock.",
-            least=0,
-            expects="seconds from 0 on, or None for no end",
-        ),
-    ] = None
-    debug: Annotated[
-        bool,
-        Option(
-            "Check every value against its port's type, and detect nodes that modify a shared value (T1).",
-            everywhere=True,
-        ),
-    ] = False
-    policy: Annotated[
-        str | None,
-        Option(
-            'The scheduling policy of all groups, instead of their own: "fifo", "priority", "deadline", "fair" or '
-            '"random" (R2).',
-            expects="the name of a policy",
-            flag="--policy",
-            everywhere=True,
-        ),
-    ] = None
-    seed: Annotated[
-        int | None,
-        Option(
-            'The seed of the policy "random", and of the jitter of retries.',
-            expects="a whole number",
-            flag="--seed",
-            everywhere=True,
-        ),
-    ] = None
-    trace: Annotated[
-        Any,
-        Option(
-            "Receives every event of the run (R7): a list, a function, or another consumer. Removed if it raises.",
-            expects="a list, a function or another consumer",
-        ),
-    ] = None
-    block_warning_s: Annotated[
-        float,
-        Option(
-            "Warn about a firing that blocks the event loop for longer than this; 0 never warns.",
-            least=0,
-            expects="seconds, or 0 for never",
-            everywhere=True,
-        ),
-    ] = 0.1
-    fast: Annotated[
-        bool, Option("Fuse plain nodes and use fast paths. Results are the same without it.", everywhere=True)
-    ] = True
-    watch: Annotated[
-        bool | str | None,
-        Option(
-            "Let `hfg top` and `hfg tap` in other processes of the same user watch the run, on the real clock. A "
-            "string is the name that they show for the program. Default: whether the environment has HFG_WATCH=1.",
-            expects="True or False, or what hfg top shows as the program",
-        ),
-    ] = None
-    settings: Annotated[
-        str | Path | None,
-        Option(
-            "File with the settings of the network: where agents are found, and who else may watch the run.",
-            expects='the file of a realm, as in settings="cell.toml"',
-        ),
-    ] = None
 
 
 PLAIN: Final = EdgeOptions()

@@ -17,7 +17,7 @@ import msgspec
 from hfg.activity.rules import asked_for
 from hfg.base.token import Token
 from hfg.base.values import own_copy
-from hfg.engine.editing.pausing import Breakpoint, Step
+from hfg.engine.editing.breakpoints import Breakpoint, Step
 from hfg.engine.editing.setting import need_settable, without_effect
 from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
@@ -195,7 +195,7 @@ class CutRun(Run):
     async def wait_paused(self) -> str:
         """See `Run.wait_paused`: of all parts."""
         why = await super().wait_paused()
-        ended = "the run has ended: nothing can pause it any more"
+        ended = "cannot pause: the run has ended"
         for part in self._asking.others:
             await self._answer(part, ended, "wait_paused")
         return why

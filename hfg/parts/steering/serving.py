@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any, Final
 
 from hfg.base.token import Token
-from hfg.engine.editing.pausing import Breakpoint
+from hfg.engine.editing.breakpoints import Breakpoint
 from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
 from hfg.engine.model.running_node import RunningNode
