@@ -70,7 +70,7 @@ class Add(Command, frozen=True):
     type: str
     path: str
     parameters: dict[str, Any] = msgspec.field(default_factory=dict)
-    options: NodeData = msgspec.field(default_factory=dict)
+    options: NodeData = msgspec.field(default_factory=dict)  # type: ignore[assignment]  # an empty one
 
     @override
     def references(self) -> Iterable[str]:
@@ -91,7 +91,7 @@ class AddSubgraph(Command, frozen=True):
     outputs: dict[str, str] = msgspec.field(default_factory=dict)
     events: dict[str, str] = msgspec.field(default_factory=dict)
     slots: dict[str, str] = msgspec.field(default_factory=dict)
-    options: NodeData = msgspec.field(default_factory=dict)
+    options: NodeData = msgspec.field(default_factory=dict)  # type: ignore[assignment]  # an empty one
 
     @override
     def types(self) -> Iterable[str]:
