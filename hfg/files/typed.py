@@ -11,7 +11,7 @@ from math import isfinite
 from typing import Any, Final
 
 from hfg.catalogue.describing import ParameterDescription, TypeDescription
-from hfg.encoding.data import TAG
+from hfg.encoding import TAG
 
 __all__ = ["with_types"]
 

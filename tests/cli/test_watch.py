@@ -159,7 +159,7 @@ def test_tap_shows_seconds_since_the_run_began_and_finds_a_run_by_its_name(comma
     assert now.glance is not None
     first, second = (float(line.split()[0]) for line in shown.out.splitlines())
     assert 0.05 <= first < second <= now.glance.duration_s + 0.001
-    assert "the run ticking goes on as it is" in several.err
+    assert "the run ticking is only watched and not changed" in several.err
     with program(watch=True), program(watch=True):
         listed = command("tap", "ticking", "ticks.out")
     assert listed.code == 2
@@ -184,8 +184,11 @@ def test_tap_ends_with_the_run_and_says_so(command: Command) -> None:
     ("arguments", "sentence"),
     [
         (("tick.out",), 'graph "ticking" has no node "tick"; did you mean "ticks"?'),
-        (("ticks.out", "--until", "3"), "is only looked at: leave out --param, --until and --clock"),
-        (("ticks.out", "--param", "ticks.count=3"), "is only looked at: leave out --param, --until and --clock"),
+        (("ticks.out", "--until", "3"), "is only watched and not changed: leave out --param, --until and --clock"),
+        (
+            ("ticks.out", "--param", "ticks.count=3"),
+            "is only watched and not changed: leave out --param, --until and --clock",
+        ),
     ],
 )
 def test_what_a_run_elsewhere_has_not_is_one_sentence(
