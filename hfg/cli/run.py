@@ -70,6 +70,10 @@ def run(
     json: Annotated[
         bool, typer.Option("--json", help="Write the report as JSON. Output of nodes goes to standard error.")
     ] = False,
+    explain: Annotated[
+        bool,
+        typer.Option("--explain", help="Afterwards, tell for each node whether it was fused, and if not, why."),
+    ] = False,
     debug: DebugOption = False,
     verbose: VerboseOption = 0,
     **options: Any,  # those that declare a flag
@@ -79,6 +83,7 @@ def run(
     output = _Output(sys.stdout)
     unwritten: list[str] = []
     pages: list[RunPage] = []
+    runs: list[Run] = []
     with (
         redirect_stdout(sys.stderr if json else output),
         _writing(trace, running, unwritten) as write,
@@ -86,6 +91,7 @@ def run(
     ):
 
         def begin(run: Run) -> None:
+            runs.append(run)
             output.when_broken = partial(asyncio.get_running_loop().call_soon_threadsafe, run.stop)
             if report_file is not None:
                 pages.append(run.report_page(report_file, pictures=pictures))
@@ -101,6 +107,8 @@ def run(
         raise output.broken
     if json and running.report is not None:
         show.json(running.report)
+    for explained in runs if explain else ():
+        show.explanations(explained.explain())
     return running.ended(verbose=verbose, reports=not json or verbose > 0) or int(bool(unwritten))
 
 

@@ -9,7 +9,7 @@ import logging
 import shlex
 import sys
 import traceback
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,10 +21,12 @@ from hfg.base.frames import is_machinery, is_standard
 from hfg.errors import EngineInternalError, FileError, NodeError, TeardownError
 
 if TYPE_CHECKING:
+    from hfg.engine.fusion.explaining import Explanation
     from hfg.engine.observing.report import Report
 
 __all__ = [
     "Records",
+    "explanations",
     "failure",
     "json",
     "report",
@@ -207,6 +209,20 @@ def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[Any]], *, 
         drawn.add_row(*map(Text, row))
     stream = sys.stderr if to_stderr else sys.stdout
     Console(file=stream, width=None if stream.isatty() else _WIDTH_OF_A_FILE).print(drawn)
+
+
+def explanations(found: Mapping[str, Explanation]) -> None:
+    """Tell on standard error how each node did its work: fused, with which others, or why not."""
+    rows = []
+    first: dict[tuple[str, ...], str] = {}
+    for path, one in found.items():
+        head = first.setdefault(one.members, path) if one.fused else ""
+        same = f", see {head}" if head not in ("", path) else ""
+        others = (
+            "" if same or len(one.members) < 2 else f": {', '.join(member for member in one.members if member != path)}"
+        )
+        rows.append((path, f"{one}{same}{others}"))
+    table("how nodes did their work", ("node", "how"), rows, to_stderr=True)
 
 
 def report(name: str, result: Report, verbosity: int) -> None:

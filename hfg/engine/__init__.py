@@ -21,6 +21,7 @@ from hfg.engine.executing.punctual import PunctualLoop
 from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.face.run import Run
 from hfg.engine.face.running import run, run_async, running
+from hfg.engine.fusion.explaining import Explanation
 from hfg.engine.observing.glance import Glance, NodeGlance
 from hfg.engine.observing.report import EdgeReport, NodeReport, Report
 from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
@@ -28,6 +29,7 @@ from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, Nod
 __all__ = [
     "EdgeReport",
     "EdgeStatistics",
+    "Explanation",
     "Glance",
     "GroupStatistics",
     "NodeGlance",

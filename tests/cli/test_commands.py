@@ -84,6 +84,13 @@ def test_verbose_tells_of_nodes_and_twice_of_edges(hfg: Command) -> None:
     assert "numbers.out -> half.number" in hfg("run", TARGET, *VIRTUAL, "-vv").err
 
 
+def test_explain_tells_why_a_node_is_not_fused(hfg: Command) -> None:
+    shown = hfg("run", TARGET, *VIRTUAL, "--explain")
+    assert shown.code == 0
+    assert "half" in shown.err
+    assert "nodes are fused after" in " ".join(shown.err.split())
+
+
 def test_json_has_standard_output_for_itself(hfg: Command) -> None:
     shown = hfg("run", TARGET, *VIRTUAL, "--json")
     report = json.loads(shown.out)

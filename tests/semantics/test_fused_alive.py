@@ -223,3 +223,51 @@ def test_random_graphs_full_of_activity_do_the_same(block: int, monkeypatch: pyt
     for seed in range(8 * block, 8 * block + 8):
         alive = Allowed(plain=True, alive=True, max_nodes=4 + seed % 9, doing=seed % 3 == 0, disabling=seed % 2 == 0)
         check(calls, seed, alive)
+
+
+class Asks(Looks):
+    """Is asked whether it is ready."""
+
+    def ready(self) -> bool:
+        return True
+
+
+class TakesTokens(hfg.Node):
+    value = hfg.Input(int)
+
+    def process(self, value: hfg.Token[int]) -> None:
+        pass
+
+
+REASONS: dict[str, tuple[Callable[[], Any], dict[str, Any], str]] = {
+    "ready": (Asks, {}, "ready()"),
+    "tokens": (TakesTokens, {}, "take values"),
+    "retries": (Looks, {"retries": 2}, "retries="),
+}
+
+
+@pytest.mark.parametrize(("make", "options", "reason"), REASONS.values(), ids=REASONS)
+def test_a_node_that_is_not_fused_has_a_reason(make: Callable[[], Any], options: dict[str, Any], reason: str) -> None:
+    graph, node = hfg.Graph(), make()
+    first = graph.add(forward(), name="first")
+    graph.connect(graph.add(numbers(count=WAVES)).out, first.value)
+    graph.add(node, name="odd", **options)
+    graph.connect(first.out, node.value)
+    runs: list[hfg.Run] = []
+    hfg.run(graph, clock="virtual", begin=runs.append)
+    explained = runs[0].explain()
+    assert not explained["odd"].fused
+    assert reason in explained["odd"].reason
+    assert explained["first"].members == ("numbers", "first")
+    assert runs[0].explain("odd") == {"odd": explained["odd"]}
+
+
+def test_a_throttled_gate_and_a_run_without_fast_paths_are_named() -> None:
+    graph = hfg.Graph()
+    nodes = chain(graph, forward(), forward())
+    graph.gate(nodes[1], by=graph.add(Holds()), idle_rate_hz=10.0)
+    runs: list[hfg.Run] = []
+    for fast in (True, False):
+        hfg.run(graph, clock="virtual", fast=fast, begin=runs.append)
+    assert "idle_rate_hz=" in runs[0].explain()["b"].reason
+    assert {"fast=False" in one.reason for path, one in runs[1].explain().items() if path in "ab"} == {True}

@@ -1,7 +1,8 @@
-"""Which running nodes may be members of a fused region, and which may lead one.
+"""Which running nodes may be members of a fused region, and which may lead one; and if not, why.
 
-A member's firings are calls of its function and nothing else: what else a firing may be asked to do (a gate, a time
-limit, `ready()`, slots, somebody who looks) is for the interpreted way. Stands on the model.
+A member's firings are calls of its function, and what a wave can look at besides. What else a firing may be asked to do
+(`ready()`, a time limit, retries, somebody who looks) is for the interpreted way. Each refusal is a reason with its
+remedy, for `explaining`. Stands on the model.
 """
 
 from __future__ import annotations
@@ -12,56 +13,90 @@ from hfg.engine.model.policies import Fifo
 from hfg.engine.model.running_node import ENDED, RunningNode
 from hfg.ports.edges import SyncEdge
 
-__all__ = ["is_alive", "is_plain_and_fed", "lives_by_its_slots", "may_be_called", "may_be_inside"]
+__all__ = ["is_alive", "is_plain_and_fed", "lives_by_its_slots", "may_be_called", "may_be_inside", "refusal"]
 
 
-def _is_plain(worker: RunningNode) -> bool:
-    """Its firings are calls of a function and nothing else."""
-    return (
-        worker.type is not None
-        and worker.options is not None
-        and worker.scope is None
-        and _nobody_looks(worker)
-        and isinstance(worker.group.policy, Fifo)
-        and not worker.group.several  # of which one wave would keep the other threads waiting
-        and not (worker.group.threaded and (worker.is_async or worker.listeners))  # which is for the loop to look at
-        and not (is_alive(worker) and (worker.group.threaded or worker.is_async))
-        and not (worker.options.max_duration_s and (worker.is_async or worker.group.threaded))  # else it never waits
-        and worker.ready_hook is None
-        and all(gate.idle_rate_hz is None for gate in worker.gates_over)
-        and worker.concurrent is None
-        and worker.attempts is None
-        and worker.iteration is None
-        and _values_in_and_out(worker)
-    )
+def refusal(worker: RunningNode) -> str:
+    """Say what keeps a node from being fused with any others, and what to do about it; "" if nothing does."""
+    return _looks(worker) or _of_the_group(worker) or _of_its_options(worker) or _of_its_ports(worker)
 
 
-def _values_in_and_out(worker: RunningNode) -> bool:
-    """It takes values and gives back values, and that is all that passes its ports."""
+def _looks(worker: RunningNode) -> str:
+    """Of a run or node that somebody looks at step by step: so each firing is to be seen by itself."""
+    core = worker.core
+    if not core.fast:
+        return "the run interprets every firing: leave out fast=False"
+    if core.debug:
+        return "the run checks every firing: leave out debug=True"
+    if core.trace is not None:
+        return "a trace sees every firing: stop tracing, or trace changes only (changes_only=True)"
+    if worker.within is not None:
+        return "it is inside of a subgraph that iterates, which looks after each step (G4)"
+    if worker.halt is not None:
+        return "it has a breakpoint: remove that"
+    if worker.observed or worker.idle_callbacks is not None:
+        return "code or an edit waits for its next firing: it is fused again when the run goes on"
+    if worker.slot_edges and any(event.tap for event in worker.events.values()):
+        return "its events are tapped, which tells the number of each call: end the tap"
+    if worker.group.threaded and any(edge.tap is not None for edges in worker.out_edges for edge in edges):
+        return "its outputs are tapped, and it runs in a thread: end the tap"
+    return ""
+
+
+def _of_the_group(worker: RunningNode) -> str:
+    group = worker.group
+    if not isinstance(group.policy, Fifo):
+        return f'group "{group.name}" is not first in, first out: give it policy="fifo", or the node another group'
+    if group.several:
+        return f'group "{group.name}" has several threads, which one wave would keep waiting: use threads=1'
+    if group.threaded and (worker.is_async or worker.listeners):
+        return "its code, or a slot that listens only while active, is for the loop: take it out of the thread group"
+    if is_alive(worker) and (group.threaded or worker.is_async):
+        why = "async" if worker.is_async else "in a thread group"
+        return f"it is {why} and has slots, a gate or `processed` connected: write a plain function on the loop"
+    return ""
+
+
+def _of_its_options(worker: RunningNode) -> str:
+    options = worker.options
+    if worker.type is None or options is None or worker.scope is not None:
+        return "it is no node with code of its own"
+    if options.max_duration_s and (worker.is_async or worker.group.threaded):
+        return "its firings have a time limit: leave out max_duration_s="
+    if worker.ready_hook is not None:
+        return "it is asked `ready()` before each firing: leave that out, or stay silent instead"
+    if any(gate.idle_rate_hz is not None for gate in worker.gates_over):
+        return "a gate throttles it: leave out idle_rate_hz="
+    if worker.concurrent is not None:
+        return "it has several firings at once: leave out concurrency="
+    if worker.attempts is not None:
+        return "a firing that fails is repeated: leave out retries="
+    return "it iterates over a collection (G4)" if worker.iteration is not None else ""
+
+
+def _of_its_ports(worker: RunningNode) -> str:
+    """Whether it takes values and gives values, and that is all that passes its inputs and outputs."""
     kind = worker.type
-    return (
-        not worker.shape.remembers
-        and not any(edge.source is worker and type(edge) is SyncEdge for edge in worker.slot_edges)
-        and len(worker.out_names) == len(kind.outputs)
-        and not any(worker.wants_token)
-        and all(edge.target_kind == "input" and not edge.ended for edge in worker.in_edges)
-        and not (worker.is_async and kind.events)
-    )
+    if worker.shape.remembers:
+        return "its event `failed` is connected, which tells what a firing took: disconnect it"
+    if any(edge.source is worker and type(edge) is SyncEdge for edge in worker.slot_edges):
+        return "its output leads to a slot of its own: use an event for that"
+    parameter = any(edge.target_kind != "input" for edge in worker.in_edges)
+    if parameter or len(worker.out_names) != len(kind.outputs):
+        return "a parameter of it is connected: set it with run.set, or make it an input or output"
+    if any(worker.wants_token):
+        return "its code takes tokens: take values"
+    if any(edge.ended for edge in worker.in_edges):
+        return "an optional input has ended (F4)"
+    return "it is async and has events: use outputs, or a plain function" if worker.is_async and kind.events else ""
 
 
-def _nobody_looks(worker: RunningNode) -> bool:
-    """No edit waits for it, nobody at its barriers, no breakpoint; and no tap where a wave runs in a thread.
+def is_alive(worker: RunningNode) -> bool:
+    """Whether more than its inputs decides what a firing does, or more than its outputs leaves with it.
 
-    Nor does anybody look at the events of its slots, who would want to know in which call a signal was triggered: in a
-    wave calls are not numbered one by one.
+    Only a wave on the loop looks at that, and none in which async code gives way to others.
     """
-    return (
-        not worker.observed
-        and worker.idle_callbacks is None
-        and worker.halt is None
-        and not (worker.slot_edges and any(event.tap for event in worker.events.values()))
-        and not (worker.group.threaded and any(edge.tap is not None for edges in worker.out_edges for edge in edges))
-    )
+    return bool(worker.slot_edges or worker.gates_over or worker.shape.announced)
 
 
 def may_be_inside(worker: RunningNode) -> bool:
@@ -75,16 +110,8 @@ def may_be_inside(worker: RunningNode) -> bool:
         and 0 < len(worker.live_inputs) == len(worker.in_edges)
         and all(type(edge) is SyncEdge and edge.depth_first for edge in worker.in_edges)
         and not worker.paced
-        and _is_plain(worker)
+        and not refusal(worker)
     )
-
-
-def is_alive(worker: RunningNode) -> bool:
-    """Whether more than its inputs decides what a firing does, or more than its outputs leaves with it.
-
-    Only a wave on the loop looks at that, and none in which async code gives way to others.
-    """
-    return bool(worker.slot_edges or worker.gates_over or worker.shape.announced)
 
 
 def may_be_called(worker: RunningNode) -> bool:
@@ -99,31 +126,24 @@ def may_be_called(worker: RunningNode) -> bool:
         and not edge.while_active
         and not worker.unfit
         and isinstance(worker.group.policy, Fifo)
-        and _nobody_looks(worker)
+        and not _looks(worker)
     )
 
 
 def lives_by_its_slots(worker: RunningNode) -> bool:
     """Its calls may go the fast path: nobody looks, and nothing depends on its activity but itself."""
-    options = worker.options
-    if options is None or worker.group.threaded or worker.is_source or worker.in_edges or not _may_be_fast(worker):
+    options, core = worker.options, worker.core
+    if options is None or worker.group.threaded or worker.is_source or worker.in_edges or worker.within is not None:
         return False
     held = worker.gates_over or worker.ready_hook is not None or options.max_rate_hz or options.max_duration_s
     looked_at = worker.observed or worker.idle_callbacks is not None or worker.scopes or worker.watched
-    return bool(worker.slot_edges) and not held and not looked_at
-
-
-def _may_be_fast(worker: RunningNode) -> bool:
-    """Nobody looks at all that happens in the run, and no border behind each step (G4)."""
-    core = worker.core
-    return core.fast and not core.debug and core.trace is None and worker.within is None
+    interpreted = not core.fast or core.debug or core.trace is not None
+    return bool(worker.slot_edges) and not held and not looked_at and not interpreted
 
 
 def is_plain_and_fed(worker: RunningNode) -> bool:
     """Whether it is a source, or a function with an edge into each input that it waits for, and nobody looks."""
-    if not _may_be_fast(worker):
-        return False
-    if worker.type is None or worker.process is None or not _is_plain(worker):
+    if worker.type is None or worker.process is None or refusal(worker):
         return False
     if worker.slot_edges and not _waits_after_firing(worker):
         return False

@@ -105,8 +105,11 @@ class Region(Exits):
 
     def over(self, done: int) -> None:
         """So many waves have run to their end."""
-        self.running = self.called_off = False
+        self.running = False
         self.waves += done
+        if self.called_off:  # behind the last guard, by what a member has sent
+            self.called_off = False
+            self.disarm()
         self._over()
         agenda.consider(self.head)
         last = self.order[-1]

@@ -38,6 +38,7 @@ class WaveState:
     def __init__(self, schedule: Schedule) -> None:
         self.schedule = schedule
         self.order = order = schedule.order
+        self.paths = tuple(worker.path for worker in order)
         self.head = head = order[0]
         self.core = head.core
         self.flags: Flags = self.core.flags

@@ -80,6 +80,7 @@ class FusedRegion(Protocol[NodeT]):
     head: NodeT
     running: bool
     waves: int
+    paths: tuple[str, ...]  # of its members, in the order in which they fire
 
     def at_work(self, frame: FrameType | None) -> NodeT | None:
         """Whose call a running wave is in, by the line it is at."""

@@ -84,6 +84,7 @@ class RunningNode(NodeState["RunningNode"]):
     observed: bool = False  # something waits at its barriers: no fast paths
     meter: Any = None  # a Meter, while statistics are kept
     region: FusedRegion[RunningNode] | None = None
+    fused_with: tuple[str, ...] = ()  # paths of the members of its last region
     sends_itself: bool = False  # its code sends, so the region announces it before each call
     unfit: bool = False  # its firings turned out not to be plain calls
 
@@ -288,6 +289,8 @@ class RunningNode(NodeState["RunningNode"]):
     def be_fused(self, region: FusedRegion[RunningNode] | None) -> None:
         """A region fuses its firings with those of others; None: none does any more."""
         self.region = region
+        if region is not None:
+            self.fused_with = region.paths
 
     def fit_no_more(self) -> None:
         """Its firings are hardly ever plain: no region takes it any more."""
