@@ -91,13 +91,13 @@ class Turns(WaveState):
         if self.order[p].calls:
             self.expect(p)
         else:
-            self.order[p].queued = True
+            self.order[p].take_place()
 
     def expect(self, p: int) -> None:
         """Member p is enabled, and calls wait at it: they come before its firing, where they stand (F9)."""
         worker = self.order[p]
         worker.make_fireable()
-        worker.is_next = True
+        worker.run_next()
 
     def calls_first(self, p: int) -> bool:
         """Calls wait at member p, and nobody of the wave goes before it any more; whether the wave is to stop there.
@@ -109,19 +109,20 @@ class Turns(WaveState):
             self.expect(p)
         if not self._work_off(self.head.group.policy, worker):
             return True
-        worker.queued = worker.fireable = False
+        worker.use_turn()
         return False
 
     def call_again(self, k: int) -> bool:
         """Member k has fired, and calls wait at it: they have their place now; whether the wave is to stop there."""
         worker = self.order[k]
-        goes_next, worker.is_next = worker.is_next, False
+        goes_next = worker.is_next
+        worker.clear_next()
         if worker.blocked >= NO_CALLS:
             return False
         if not goes_next:
             worker.enqueue()
             return False
-        worker.queued = True  # its call was enabled over a sequential edge, and goes before all else (R2)
+        worker.take_place()  # its call was enabled over a sequential edge, and goes before all else (R2)
         return not self._turn(worker)
 
     # --- activity, and what a firing sends by itself ----------------------------------------------------------------
@@ -138,7 +139,8 @@ class Turns(WaveState):
         Amid a wave, that is: whether code that was not known to send does so is still asked (`is_sending`).
         """
         worker = self.order[k]
-        worker.busy, worker.stamp = doing, stamp
+        worker.be_in_wave(doing)
+        worker.send_as(stamp)
         receive_modifiers(worker, [token.activity for token in tokens if token.activity])
 
     def send(self, k: int, values: Sequence[Any], stamp: float, done: int) -> bool:
@@ -154,7 +156,8 @@ class Turns(WaveState):
           Whether a token with activity lies on one of its edges inside the region.
         """
         worker, core = self.order[k], self.core
-        worker.busy, worker.stamp = "firing", stamp
+        worker.be_in_wave("firing")
+        worker.send_as(stamp)
         may_carry, carried, inside = worker.active or worker.may_carry, False, False
         hearing = [heard and heard.who_hear() for heard in worker.listeners]
         for number, (edge, output, to) in enumerate(self.schedule.outs[k]):

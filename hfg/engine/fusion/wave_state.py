@@ -217,7 +217,7 @@ class WaveState:
                 if worker.calls:
                     worker.run_after_wave()
             elif not worker.fireable and (agenda.make_fireable(worker) or worker.queued):
-                worker.calls_before = 0  # its firing was enabled before what calls it now came (F9)
+                worker.go_before_calls()
                 worker.run_after_wave()
         if not self.takes_turns and len(found) > 1:
             place = {worker: number for number, (worker, _) in enumerate(turns)}

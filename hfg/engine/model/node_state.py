@@ -86,6 +86,14 @@ class NodeState(Vertex[NodeT], Record):
         """F1 does not hold any more; a rate continues."""
         self.fireable = False
 
+    def take_place(self) -> None:
+        """A wave keeps it a place in the ready queue, in front of what the queue holds; slot calls wait behind it."""
+        self.queued = True
+
+    def go_before_calls(self) -> None:
+        """The next firing was enabled before the slot calls that wait now (F9)."""
+        self.calls_before = 0
+
     def use_turn(self) -> None:
         """It has had its turn, and with it all that it was enabled for."""
         self.queued = self.fireable = False

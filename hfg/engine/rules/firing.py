@@ -167,11 +167,11 @@ def _fire_plainly(worker: RunningNode) -> None:
     All that is taken are values, one for each input, so the function is run (F4); nobody listens.
     """
     worker.begin_firing()
-    shape, tokens = worker.shape, []
-    for edge in worker.live_inputs:  # `edge.take` and `inputs.expect` of each, without the calls
-        tokens.append(edge.token)
-        edge.token = None
-    worker.inputs.missing += len(tokens)
+    shape, inputs = worker.shape, worker.inputs
+    tokens = []
+    for edge in worker.live_inputs:
+        tokens.append(edge.take())
+        inputs.expect()
     if tokens:
         stamp = tokens[0].stamp
         for token in tokens:

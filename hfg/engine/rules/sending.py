@@ -166,8 +166,7 @@ def activity_left(worker: RunningNode) -> None:
 
 def put(edge: SyncEdge | BufferEdge, value: object, modifier: int, stamp: float) -> None:
     """Put one token on a synchronous edge."""
-    edge.sent = number = edge.sent + 1
-    token = Token(value, modifier, stamp, number)
+    token = Token(value, modifier, stamp, edge.number())
     target: RunningNode = edge.target
     core = target.core
     if core.trace is not None or edge.tap is not None:
@@ -176,19 +175,19 @@ def put(edge: SyncEdge | BufferEdge, value: object, modifier: int, stamp: float)
         core.sharing.sent(edge, token)
     slot = edge.target_kind == "slot"
     if _is_unheard(edge, value, modifier) if slot else target.blocked & ENDED:
-        _drain(edge, (value, modifier, stamp, number))
+        _drain(edge, (value, modifier, stamp, token.sequence))
         return
     if modifier > 0:
         bring_activity(target)
     if edge.put(token):
-        edge.waits.outputs.missing += 1
+        edge.waits.outputs.expect()
     elif core.trace is not None:
         core.trace(TokenProcessed(core.now(), edge.label))
     if slot:
         add_call(target, edge)
         return
     if type(value) is Marker:
-        target.special = True
+        target.mark_special()
     if type(edge) is SyncEdge or len(edge.queue) == 1:  # type: ignore[union-attr]
         arrived(edge)
 
