@@ -94,7 +94,7 @@ class Region(Exits):
             return False
         if any(edge.token.value is END for edge in self.entries):
             return False
-        head.special = False
+        head.mark_ordinary()
         return True
 
     def decline(self, worker: RunningNode) -> None:

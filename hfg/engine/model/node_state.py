@@ -228,6 +228,10 @@ class NodeState(Vertex[NodeT], Record):
 
     # --- by a fast path (see `fusion`) --------------------------------------------------------------------------------
 
+    def mark_ordinary(self) -> None:
+        """Only values are missing in its next firing, and a wave sees to that."""
+        self.special = False
+
     def hold(self, edges: tuple[Any, ...]) -> None:
         """Some of what it has sent is not processed; these edges are released after that (F5)."""
         self.holds_inputs = True
