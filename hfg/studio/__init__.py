@@ -15,6 +15,7 @@
     running_elsewhere  runs of other programs
     studio       all of it together
     local, attaching   for other programs of the same user         notebook    for the program itself
+    cookies      pages come back after a sudden end
     entrance     who may come in            web        the pages' server    serving  its thread and port
 
 All but the last line lives on the loop on which the graph runs and knows nothing of the network, so it needs no extra.

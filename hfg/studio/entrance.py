@@ -68,7 +68,14 @@ class Entrance:
     """
 
     def __init__(
-        self, host: str, port: int, *, encrypted: bool = False, names: Iterable[str] = (), embedded: bool = False
+        self,
+        host: str,
+        port: int,
+        *,
+        encrypted: bool = False,
+        names: Iterable[str] = (),
+        embedded: bool = False,
+        secret: str | None = None,
     ) -> None:
         """Make a token.
 
@@ -78,12 +85,13 @@ class Entrance:
           encrypted: it speaks TLS.
           names: further names of this machine that browsers may use.
           embedded: notebooks of this machine may show the page in a frame.
+          secret: the value of the cookie; default: a new one.
         """
         policy = _POLICY + (_NOTEBOOKS if embedded else "'none'")
         self.headers = {"Content-Security-Policy": policy, **_HEADERS}
         self.token = secrets.token_urlsafe(_TOKEN_BYTES)
         self.cookie = f"hfg-{port}"
-        self._secret = secrets.token_urlsafe(_TOKEN_BYTES)
+        self._secret = secret or secrets.token_urlsafe(_TOKEN_BYTES)
         self._scheme = "https" if encrypted else "http"
         named = f"[{host}]" if ":" in host else host
         hosts = {*_LOOPBACK, *names, *(() if _is_any(host) else (named,))}

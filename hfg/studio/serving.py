@@ -13,6 +13,7 @@ from typing import Any, Final
 import uvicorn
 
 from hfg.errors import TargetError
+from hfg.studio.cookies import forget_secret, secret_of_port
 from hfg.studio.entrance import Entrance, need_guarded
 from hfg.studio.messages import LONGEST, FromPage, read
 from hfg.studio.studio import Studio
@@ -88,10 +89,12 @@ class Server:
         encrypted = certfile is not None
         need_guarded(host, encrypted=encrypted, insecure=insecure)
         self._socket = _listening(host, port)
-        port = self._socket.getsockname()[1]
+        self._port = port = int(self._socket.getsockname()[1])
         shown = socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
         names = () if shown == host else (shown,)
-        self.entrance = Entrance(host, port, encrypted=encrypted, names=names, embedded=embedded)
+        self.entrance = Entrance(
+            host, port, encrypted=encrypted, names=names, embedded=embedded, secret=secret_of_port(port)
+        )
         self.address = f"{'https' if encrypted else 'http'}://{shown}:{port}/?token={self.entrance.token}"
         static = Path(os.environ.get("HFG_STUDIO_STATIC") or STATIC)
         config = uvicorn.Config(
@@ -124,6 +127,7 @@ class Server:
         self._server.should_exit = True
         await asyncio.to_thread(self._thread.join, 3.0)
         self._socket.close()
+        forget_secret(self._port)
 
 
 def _listening(host: str, port: int | None) -> socket.socket:

@@ -29,12 +29,22 @@ from tests.studio.test_studio import doubling, ticking
 ROOT = Path(__file__).resolve().parents[2]
 
 
-async def come_in(address: str) -> websockets.ClientConnection:
-    """Open an address as a browser does."""
-    base = address.partition("/?")[0]
+@pytest.fixture(autouse=True)
+def place(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Keep the secrets of tests out of the user's folder."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
+async def cookie_of(address: str) -> str:
     async with httpx2.AsyncClient() as client:
         answer = await client.get(address)
-    cookie = answer.headers["set-cookie"].partition(";")[0]
+    return answer.headers["set-cookie"].partition(";")[0]
+
+
+async def come_in(address: str, cookie: str = "") -> websockets.ClientConnection:
+    """Open an address as a browser does."""
+    base = address.partition("/?")[0]
+    cookie = cookie or await cookie_of(address)
     return await websockets.connect(
         f"{base.replace('http', 'ws')}/ws",
         subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]  # a text with a type of its own
@@ -151,6 +161,31 @@ def test_edits_are_offered_after_the_server_was_killed(tmp_path: Path) -> None:
         process.send_signal(signal.SIGINT)
         process.wait(patience(10))
     assert hfg.load(tmp_path / "doubling.hfg.yaml", allow=["tests"])["scaled"].factor == 9
+
+
+@pytest.mark.slow
+@pytest.mark.rule("L5")
+@pytest.mark.timeout(120)
+def test_a_page_comes_back_with_its_cookie_after_a_sudden_end_and_not_after_another(tmp_path: Path) -> None:
+    async def joined(address: str, cookie: str) -> bool:
+        try:
+            async with await come_in(address, cookie) as socket:
+                return bool((await until(socket, "hello"))["boot"])
+        except websockets.InvalidStatus:
+            return False
+
+    with command(folder=tmp_path) as (process, address):
+        cookie = asyncio.run(cookie_of(address))
+        port = re.findall(r":(\d+)/", address)[0]
+        process.send_signal(signal.SIGKILL)
+        process.wait(patience(10))
+    with command("--port", port, folder=tmp_path) as (process, again):
+        assert again != address  # the token is another one
+        assert asyncio.run(joined(again, cookie))
+        process.send_signal(signal.SIGINT)
+        process.wait(patience(10))
+    with command("--port", port, folder=tmp_path) as (_, last):
+        assert not asyncio.run(joined(last, cookie))
 
 
 @pytest.mark.slow
