@@ -1,7 +1,7 @@
 """Fast paths: what the rules prescribe for the common shapes, as fewer steps.
 
 members, schedule   which nodes may be fused, and in which order they fire
-firing_text, writing, tap_writing   the text of a wave, one generated function; binding: compiles it
+facts, firing_text, writing, tap_writing   the text of a wave, one generated function; binding: compiles it
 wave_state, turns, exits, region    a region: between its waves, within a wave, on the way out of it, as a whole
 giving_way, threads   regions with async members, and regions of a thread group
 slots, waiting      calls of slots, and async functions that really wait
