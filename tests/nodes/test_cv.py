@@ -295,6 +295,11 @@ def test_what_another_node_computes_can_move_what_is_drawn() -> None:
             "erode: the anchor 0, 2 is outside of the kernel of 5 x 2",
         ),
         (
+            cv.erode(iterations=1000),
+            {"src": np.zeros((400, 500), np.float32), "kernel": np.tri(400, 500, dtype=np.uint8)},
+            "erode: an element of 80,200 points in 1,000 iterations needs 16,040,000,000,000 steps",
+        ),
+        (
             cv.convert_maps(),
             {"map1": picture("float32", 1), "map2": np.zeros((4, 5), np.float32)},
             "convert_maps: map1 is 48 x 64 and map2 4 x 5; they have one size",
@@ -369,6 +374,7 @@ def test_what_another_node_computes_can_move_what_is_drawn() -> None:
         "a power of integers",
         "an anchor outside",
         "an anchor outside of an element",
+        "work that does not end",
         "maps of two sizes",
         "corners of another board",
         "points that are no pairs",

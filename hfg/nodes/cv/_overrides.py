@@ -1051,6 +1051,25 @@ def _anchor_is_inside(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) 
     return f"the anchor {x}, {y} is outside of the kernel of {width} x {height}; -1, -1 is its middle"
 
 
+_MOST_STEPS: Final = 10**12
+"""Of one firing; about ten minutes."""
+
+
+def _work_ends(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    """An element that is no rectangle is applied point by point, and again in each iteration."""
+    kernel = inputs.get("kernel")
+    if kernel is None or bool(np.all(kernel)):
+        return None
+    points, iterations = int(np.count_nonzero(kernel)), int(parameters["iterations"])
+    steps = inputs["src"].size * points * iterations
+    if steps <= _MOST_STEPS:
+        return None
+    return (
+        f"an element of {points:,} points in {iterations:,} iterations needs {steps:,} steps, the limit is "
+        f"{_MOST_STEPS:,}; make the picture or the element smaller, or use a rectangle"
+    )
+
+
 def _size_of(kernel: Any) -> tuple[int, int]:
     return (3, 3) if kernel is None else (kernel.shape[1], kernel.shape[0])
 
@@ -1168,6 +1187,7 @@ _NEEDED: Final[tuple[tuple[str, Need], ...]] = (
         "blur boxFilter dilate erode filter2D morphologyEx sqrBoxFilter",
         Need("the anchor is outside of the kernel", _anchor_is_inside),
     ),
+    ("dilate erode morphologyEx", Need("the work would not end", _work_ends)),
     ("pow", Need("the array is of integers and the power is no whole number", _power_fits)),
     ("imdecode", Need("the picture has more pixels than HFG_MOST_PICTURE_PIXELS, 134,217,728", _picture_is_fair)),
     ("convertMaps", Need("the maps have two sizes", _maps_are_alike)),
