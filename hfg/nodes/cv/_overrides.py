@@ -1056,7 +1056,7 @@ _MOST_STEPS: Final = 10**12
 
 
 def _work_ends(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
-    """An element that is no rectangle is applied point by point, and again in each iteration."""
+    """An element that is not a rectangle is applied point by point, and again in each iteration."""
     kernel = inputs.get("kernel")
     if kernel is None or bool(np.all(kernel)):
         return None
