@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import difflib
 import hashlib
-import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -23,7 +22,6 @@ from hfg.studio.refusing import Refused
 
 __all__ = ["Project"]
 
-_LOOK_EVERY_S: Final = 1.0
 _MOST_FILES: Final = 1000
 _MOST_LINES: Final = 5000
 
@@ -56,7 +54,7 @@ class Project:
         self._dirty_from_start = 0
         self._print = self._fingerprint()
         self._elsewhere = ""
-        self._looked = 0.0
+        self._seen = self._stat()
         self.journal = Journal(self.folder, self.file, self._print)
 
     # --- what pages see ---
@@ -89,16 +87,22 @@ class Project:
         return len(history.done) + 1
 
     def look(self) -> None:
-        """See whether another program has written the file; at most once per second."""
-        now = time.monotonic()
-        if now - self._looked < _LOOK_EVERY_S:
+        """See whether another program has written the file. It is read only if its time or size has changed."""
+        stat = self._stat()
+        if stat == self._seen:
             return
-        self._looked = now
-        self._elsewhere = ""
+        self._seen, elsewhere = stat, ""
         if self.file is not None and self._fingerprint() != self._print:
-            gone = not self.file.exists()
-            what = "was removed" if gone else "was changed on disk by another program"
-            self._elsewhere = f"{self.file.name} {what}. Yours has {_count(self.changes)}."
+            what = "was removed" if stat is None else "was changed on disk by another program"
+            elsewhere = f"{self.file.name} {what}. Yours has {_count(self.changes)}."
+        self._elsewhere = elsewhere
+
+    def _stat(self) -> tuple[int, int] | None:
+        try:
+            found = None if self.file is None else self.file.stat()
+        except OSError:
+            return None
+        return None if found is None else (found.st_mtime_ns, found.st_size)
 
     def _fingerprint(self) -> str:
         """Tell contents apart."""
@@ -169,7 +173,7 @@ class Project:
                 "file",
                 f'{file.name} is code, which the studio does not write: save under a name that ends in "{SUFFIX}"',
             )
-        self._looked = 0.0
+        self._seen = None
         self.look()
         if not force and file == self.file and self._elsewhere:
             raise Refused("changed", self._elsewhere)
@@ -186,6 +190,7 @@ class Project:
         self._saved = done[-1] if done else None
         self._dirty_from_start = 0
         self._print = self._fingerprint()
+        self._seen = self._stat()
         self._elsewhere = ""
 
     def take_journal(self, *, take: bool) -> None:

@@ -42,6 +42,7 @@ from hfg.studio.viewing import MOST_REQUESTS, MOST_SUBSCRIPTIONS, Outbox, Subscr
 __all__ = ["Studio"]
 
 _LOGGER: Final = Log("hfg.studio")
+_LOOK_S: Final = 1.0
 _BEAT_S: Final = 1 / 60
 _SHARE: Final = 0.03
 """Of the loop's time, for all streams of all pages together: if they want more, they all get fewer frames."""
@@ -71,6 +72,7 @@ class Studio(Following):
         self.read_only = read_only
         self._count = 0
         self._beating: asyncio.TimerHandle | None = None
+        self._looking: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         if run is not None:
             self.steering.follow(run)
@@ -143,6 +145,19 @@ class Studio(Following):
         viewer.joined = True
         self.viewers_changed()
         self.layouts_wanted()
+        if self._looking is None:
+            self._looking = asyncio.get_running_loop().call_later(_LOOK_S, self._look_at_file)
+
+    def _look_at_file(self) -> None:
+        """Look now and then whether another program has written the file, while a page would show it."""
+        self._looking = None
+        if self.viewers:
+            self._looking = asyncio.get_running_loop().call_later(_LOOK_S, self._look_at_file)
+            self._begin(self._looked())
+
+    async def _looked(self) -> None:
+        await asyncio.to_thread(self.project.look)
+        self.singles_changed()
 
     def _level(self, viewer: Viewer, level: tuple[str, str], is_open: bool) -> None:
         if is_open and len(viewer.levels) < _MOST_LEVELS:
@@ -212,8 +227,10 @@ class Studio(Following):
         for viewer in list(self.viewers.values()):
             viewer.send_away(1001, "the studio has ended")
             self.leave(viewer)
-        if self._beating is not None:
-            self._beating.cancel()
+        self.stop_following()
+        for timer in (self._beating, self._looking):
+            if timer is not None:
+                timer.cancel()
         for task in list(self._tasks):
             task.cancel()
         await self.steering.close()

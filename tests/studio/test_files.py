@@ -96,6 +96,23 @@ def test_a_file_that_was_changed_elsewhere_is_not_overwritten(file: Path) -> Non
     live(main)
 
 
+def test_pages_are_told_that_the_file_was_changed_elsewhere(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hfg.studio.studio._LOOK_S", 0.0)
+
+    async def main() -> None:
+        page = Page(opened(file)).join()
+        text = file.read_text()
+        file.write_text(text.replace("doubling", "theirs"))
+        await page.until(lambda: bool(of_file(page)["elsewhere"]))
+        file.write_text(text)  # as it was
+        await page.until(lambda: not of_file(page)["elsewhere"])
+        file.unlink()
+        await page.until(lambda: "was removed" in of_file(page)["elsewhere"])
+        await page.studio.close()
+
+    live(main)
+
+
 def test_taking_theirs_reads_the_file_again(file: Path) -> None:
     async def main() -> None:
         page = Page(opened(file)).join()
