@@ -150,6 +150,7 @@ def violations(module: str, file: Path) -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_imports_go_down_only() -> None:
     for module in HFG:
         found = violations(module, HFG[module])

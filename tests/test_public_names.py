@@ -30,6 +30,7 @@ def loaded(module: str) -> ModuleType:
     return importlib.import_module(module)
 
 
+@pytest.mark.slow
 def test_all_is_there_sorted_and_without_doubles() -> None:
     for module in PUBLIC:
         exported = getattr(loaded(module), "__all__", None)
@@ -37,12 +38,14 @@ def test_all_is_there_sorted_and_without_doubles() -> None:
         assert list(exported) == sorted(set(exported), key=order), f"{module}.__all__ is not sorted"
 
 
+@pytest.mark.slow
 def test_all_names_what_exists() -> None:
     for module in PUBLIC:
         missing = [name for name in loaded(module).__all__ if not hasattr(loaded(module), name)]
         assert not missing, f"{module}.__all__ names {missing}, which the module does not have"
 
 
+@pytest.mark.slow
 def test_public_definitions_are_in_all() -> None:
     """A function or class that others must not use has an underscore, or lives in a module that has one."""
     for module in PUBLIC:

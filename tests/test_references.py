@@ -214,6 +214,7 @@ def test_a_module_imports_what_it_says_it_stands_on() -> None:
     assert not dead, "named, but not imported: " + ", ".join(dead)
 
 
+@pytest.mark.slow
 def test_documents_whose_sections_are_named_exist() -> None:
     dead = [
         f"{prose.at(match)}: {match[1]}"

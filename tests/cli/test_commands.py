@@ -226,6 +226,7 @@ def test_a_builder_that_is_refused_shows_one_traceback_that_begins_with_its_line
     assert "exception" not in shown.err
 
 
+@pytest.mark.slow
 def test_what_our_own_nodes_raise_is_told_by_its_sentence_alone(hfg: Command) -> None:
     with Path("halves.py").open("a", encoding="utf-8") as file:
         file.write(

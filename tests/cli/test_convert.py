@@ -41,6 +41,7 @@ def test_the_schema_is_written(command: Command) -> None:
     assert command("convert", "--schema", "no/such/folder.json").code == 2
 
 
+@pytest.mark.slow
 def test_the_schema_knows_node_types_of_an_allowed_module_of_the_current_folder(command: Command) -> None:
     shown = command("convert", "--schema", "--allow", "steps")
     assert (shown.code, shown.err) == (0, "")
@@ -80,6 +81,7 @@ connections:
 """
 
 
+@pytest.mark.slow
 def test_a_file_of_csapex_becomes_a_graph_file_with_a_report(command: Command) -> None:
     Path("count.apex").write_text(APEX)
     shown = command("convert", "count.apex", "count.hfg.yaml")

@@ -120,6 +120,7 @@ def test_the_json_has_all_that_is_known(lamps: Command) -> None:
     assert [one["name"] for one in json.loads(lamps("nodes", "lamps:dim", "--json").out)] == ["dim"]
 
 
+@pytest.mark.slow
 def test_words_and_categories_choose(lamps: Command) -> None:
     assert lamps("nodes", "lamps", "--search", "share lumen").out.split() == [
         "lamps:dim",

@@ -68,6 +68,7 @@ def test_it_accepts_the_default_of_each_parameter() -> None:
     assert count > 900
 
 
+@pytest.mark.slow
 def test_it_says_what_each_parameter_means_with_its_unit_and_limits() -> None:
     wait = known()["$defs"]["parameters of hfg.nodes.activity:Wait"]["properties"]["seconds"]
     assert wait["type"] == ["number", "string"]  # "inf" is one

@@ -251,6 +251,7 @@ def test_a_plan_prints_as_the_program_that_builds_it(plan: GraphPlan) -> None:
     ]
 
 
+@pytest.mark.slow
 @given(tokens())
 def test_silence_is_never_active(one: Token[Any]) -> None:
     assert one.value is not NO_MESSAGE or one.activity == 0

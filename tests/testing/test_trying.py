@@ -229,6 +229,7 @@ def test_what_keeps_its_word_is_usable(kind: Any) -> None:
         assert trial.reference.startswith(f"{__name__}:")
 
 
+@pytest.mark.slow
 def test_declared_errors_are_counted() -> None:
     trial = try_type(divides)
     assert (trial.refused > 0, trial.errors) == (True, ("ZeroDivisionError",))
