@@ -21,7 +21,7 @@ from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.settings import Settings
 from hfg.errors import EngineInternalError, HfgError
 from hfg.graph import Graph
-from hfg.graph.flat import MAIN, cut, flatten
+from hfg.graph.flat import MAIN, CutEdge, cut, flatten
 from hfg.graph.structure.level import level_of
 from hfg.parts.model import messages
 from hfg.parts.model.agreement import Rest
@@ -191,6 +191,11 @@ class Worker:
         level_of(graph).whole.begin_run(self._serving.run)
         composition.consumers.leave_out(trace_filter(self._name, edges))
         part.engine.callbacks.finished.append(partial(self._ended, part))
+        self._connect(part, edges, remembered(cutting), message)
+        return part
+
+    def _connect(self, part: Part, edges: list[CutEdge], remembered: frozenset[str], message: messages.Open) -> None:
+        """Connect the part with its neighbours."""
         incarnations = message.incarnations
         neighbours = {edge.source for edge in edges} | {edge.target for edge in edges}
         for other in neighbours - {self._name, MAIN}:
@@ -203,11 +208,10 @@ class Worker:
             incarnations,
             edges,
             self._say,
-            remembered(cutting),
+            remembered,
             shares_memory=message.shares_memory,
         )
         self._shares_memory = message.shares_memory
-        return part
 
     def _keeper(self, composition: Composition, kept: bytes | None, keeps_states: bool) -> Checkpointer:
         def keep(number: int, data: bytes) -> None:

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Mapping
 from contextlib import asynccontextmanager
 from functools import partial
-from typing import Any, Final, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 from hfg.base.logs import Log
 from hfg.base.token import END, NO_MESSAGE, Token
@@ -68,6 +68,43 @@ class Incoming(Protocol):
         """Report how the consumer handles tokens from now on, after it has taken so many."""
 
 
+class _Kinds(NamedTuple):
+    """How a part handles its edges to and from others, by label.
+
+    Attributes:
+      portions: number of processed tokens after which their producer is told.
+      lossy: edges that may lose tokens.
+      drains: edges whose tokens do not inherit positions.
+      by_number: incoming edges whose tokens are counted by their numbers, here and by the producer.
+      counted_by_number: edges whose tokens are counted by their numbers.
+      producers: the part at the other end of each incoming edge.
+    """
+
+    portions: dict[str, int]
+    lossy: frozenset[str]
+    drains: frozenset[str]
+    by_number: frozenset[str]
+    counted_by_number: frozenset[str]
+    producers: dict[str, str]
+
+    @classmethod
+    def of(
+        cls, name: str, edges: list[CutEdge], inherited: frozenset[str], remembered: frozenset[str], *, keeps: bool
+    ) -> _Kinds:
+        coming = [edge for edge in edges if edge.target == name]
+        counted = remembered - inherited  # by a ledger, whose numbers may be those of a former run
+        return cls(
+            {edge.label: max(edge.window // 4, 1) for edge in edges},
+            frozenset(edge.label for edge in edges if edge.guarantee != "exact"),
+            frozenset(edge.label for edge in edges if edge.label not in inherited),
+            frozenset(
+                edge.label for edge in coming if not keeps and is_synchronous(edge) and edge.label not in counted
+            ),
+            frozenset(edge.label for edge in edges if is_synchronous(edge) and edge.label not in remembered),
+            {edge.label: edge.source for edge in coming},
+        )
+
+
 class Part:
     """One part of a run.
 
@@ -116,10 +153,14 @@ class Part:
         self._is_at_rest = False
         self._looks_later = False
         engine = self.engine
-        keeps = {edge.label: edge.guarantee == "exact" for edge in edges}
+        self._kinds = kinds = _Kinds.of(name, edges, inherited, remembered, keeps=keeper is not None)
         self.outlets: dict[str, Outlet] = {
             one.port_name: Outlet(
-                engine, one, keeps=keeps[one.port_name], wake=self._wake, drains=one.port_name not in inherited
+                engine,
+                one,
+                keeps=one.port_name not in kinds.lossy,
+                wake=self._wake,
+                drains=one.port_name in kinds.drains,
             )
             for one in engine.core.outlets
         }
@@ -128,28 +169,15 @@ class Part:
         }
         self._outgoing: dict[str, Outgoing] = {}
         self._incoming: dict[str, Incoming] = {}
-        self._portions = {edge.label: max(edge.window // 4, 1) for edge in edges}
-        self._lossy = frozenset(label for label, kept in keeps.items() if not kept)
-        self._drains = frozenset(edge.label for edge in edges if edge.label not in inherited)
         self._hearing: dict[str, Hearing] = dict.fromkeys(self.inlets, "open")
         self._speaking = dict.fromkeys(self.outlets, True)
         self._said: list[tuple[str, bool, int]] = []
         self._remembered = remembered
         self._gone: dict[str, int] = {}  # of edges into a ledger: how many were lost before it, and count as come
         self._came_before: dict[str, int] = {}  # how many had arrived when the producer of an edge was restarted
-        counted = remembered - inherited  # by a ledger, whose numbers may be those of a former run
-        self._by_number = frozenset(
-            edge.label
-            for edge in edges
-            if keeper is None and edge.target == name and is_synchronous(edge) and edge.label not in counted
-        )
-        self._counted_by_number = frozenset(
-            edge.label for edge in edges if is_synchronous(edge) and edge.label not in remembered
-        )
         self._over: set[str] = set()  # edges on which END has come
         # Edges from a ledger, whose numbers may be from a previous run: they count from where their consumer resumes.
         self._fresh: set[str] = set()
-        self._producers = {edge.label: edge.source for edge in edges if edge.target == name}
         self._returns = returns and keeper is None
         self._progresses = list(self._make_progresses(edges, components))
         self._of: dict[str, Progress] = {
@@ -201,7 +229,7 @@ class Part:
 
     def is_by_number(self, label: str) -> bool:
         """Return whether the n-th token of an incoming edge has the number n in all incarnations of its producer."""
-        return label in self._by_number
+        return label in self._kinds.by_number
 
     def is_aligned(self, label: str) -> bool:
         """Return whether it is known where this incarnation resumes at this end of an edge."""
@@ -285,7 +313,7 @@ class Part:
     def _receive(self, label: str, tokens: list[Arrived]) -> None:
         self._is_at_rest = False
         inlet = self.inlets[label]
-        if tokens and label not in self._lossy:
+        if tokens and label not in self._kinds.lossy:
             inlet.heard = max(inlet.heard, tokens[-1][1][1])
         if self.is_aligned(label):
             if tokens:
@@ -316,7 +344,7 @@ class Part:
 
     def _in_order(self, label: str, inlet: Inlet, tokens: list[Arrived]) -> list[Arrived]:
         """Return the tokens to put on the edge: the n-th one has the number n."""
-        if label in self._fresh or (label not in self._by_number and label not in self._start):
+        if label in self._fresh or (label not in self._kinds.by_number and label not in self._start):
             return tokens
         following = inlet.received + 1
         if (
@@ -362,7 +390,7 @@ class Part:
         is_own = (
             self._start.get(label, 0) > inlet.received
         )  # the producer has sent them, and previous incarnations lost them
-        whose = self.name if is_own else self._producers[label]
+        whose = self.name if is_own else self._kinds.producers[label]
         tokens = "1 token was" if count == 1 else f"{count} tokens were"
         what = f'edge "{label}": {tokens} lost with a process of {called(whose)}'
         if not is_own and self.keeper is None:
@@ -495,9 +523,9 @@ class Part:
         if progress is not None and not progress.has_begun:
             progress.alignment.done(label, number)
             self.engine.at_once(partial(self._align, progress))
-        elif label in self._by_number and inlet.received < number and label not in self._over:
+        elif label in self._kinds.by_number and inlet.received < number and label not in self._over:
             self.engine.at_once(partial(self._lose_up_to, label, number))
-        elif self.keeper is not None and label in self._counted_by_number:
+        elif self.keeper is not None and label in self._kinds.counted_by_number:
             self._lose_before_ledger(label, number)
 
     def _lose_before_ledger(self, label: str, number: int) -> None:
@@ -575,7 +603,7 @@ class Part:
         self._is_at_rest = False
         inlet, progress = self.inlets[label], self._of.get(label)
         self._came_before[label] = self._came(label)
-        if progress is not None and not progress.has_begun and label not in self._by_number:
+        if progress is not None and not progress.has_begun and label not in self._kinds.by_number:
             self._fresh.add(label)
             progress.alignment.done(label, 0)
             self.engine.at_once(partial(self._align, progress))
@@ -609,7 +637,7 @@ class Part:
         if self.keeper is not None:
             self._settle_kept()
         elif not self._inherits(inlet.label) and (
-            not self.engine.core.pumping or inlet.taken - inlet.settled >= self._portions[inlet.label]
+            not self.engine.core.pumping or inlet.taken - inlet.settled >= self._kinds.portions[inlet.label]
         ):
             self._settle_at(inlet, inlet.taken)
 
@@ -710,7 +738,7 @@ class Part:
 
         If the consumer has ended, all tokens are drained where they are; lossy tokens are not reported.
         """
-        settled = (end.hearing == "over" and end.label in self._drains) or end.label in self._lossy
+        settled = (end.hearing == "over" and end.label in self._kinds.drains) or end.label in self._kinds.lossy
         return (count, count if settled else done, end.hearing, end.speaking)
 
     def answer(self, question: Question) -> Answer:

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from hfg.base.token import Token
 from hfg.engine.editing.breakpoints import Breakpoint
+from hfg.engine.editing.edits import Edits
 from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
 from hfg.engine.model.running_node import RunningNode
@@ -61,7 +62,6 @@ class Serving:
         """
         self._graph = graph
         self._emptied = emptied
-        edits = composition.edits
         self.run = Run(graph, composition)
         self._crossing = Crossing(flat)
         self._composition = composition
@@ -70,7 +70,10 @@ class Serving:
         self._watching: dict[int, _Watching] = {}
         composition.pausing.when_hit(self._hit)
         self._hits: dict[Breakpoint, int] = {}
-        self._verbs: dict[str, Callable[..., Any]] = {
+        self._verbs = self._make_verbs(graph, composition.edits)
+
+    def _make_verbs(self, graph: Graph, edits: Edits) -> dict[str, Callable[..., Any]]:
+        return {
             "trigger": self._trigger,
             "set": self._set,
             "wait_for": self._wait_for,
