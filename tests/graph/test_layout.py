@@ -400,6 +400,23 @@ def test_lines_find_their_way_among_nodes_that_somebody_has_put_anywhere() -> No
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_lines_find_their_way_where_there_is_no_row_and_no_lane(seed: int) -> None:
+    graph, chance = at_random(seed), random.Random(seed)
+    nodes = lay_out(graph).nodes
+    places = {
+        one.id: (one.x * 1.3 + chance.randrange(-20, 20), one.y * 1.6 + chance.randrange(-10, 10)) for one in nodes
+    }
+    drawn = lay_out(graph, View(places=places))
+    assert {one.id: (one.x, one.y) for one in drawn.nodes} == places
+    for line in drawn.lines:
+        for left, top, right, bottom in strokes(line):
+            for one in drawn.nodes:
+                inside = left < one.x + one.width - 1 and right > one.x + 1
+                assert not (inside and top < one.y + one.height - 1 and bottom > one.y + 1), (line.edges, one.id)
+
+
+@pytest.mark.slow
 def test_300_nodes_take_well_under_a_second_of_processor_time() -> None:
     graph = large(300)
     took = []

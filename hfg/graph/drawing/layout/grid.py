@@ -18,7 +18,7 @@ __all__ = ["GUTTER", "Axis", "Grid"]
 
 GUTTER: Final = 28.0  # between two lanes
 _NARROWEST: Final = 8.0  # channel among things placed by the user
-_ROOM: Final = 10.0
+_ROOM: Final = 6.0
 _WIDEST: Final = 200.0  # around things placed by the user
 
 

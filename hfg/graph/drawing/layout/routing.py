@@ -1,8 +1,8 @@
 """Which channels each line runs through: as few corners as there can be, no node below it, short.
 
 A line leaves its port straight ahead, turns into a channel, perhaps from there into others, and comes straight to the
-other port. All ways with at most three channels are tried; a longer one is never needed where there is a channel
-between any two rows and lanes. Lines of one net like to run together.
+other port. All ways with at most three channels are tried; a longer one is needed only among nodes that the user has
+placed. Lines of one net like to run together.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import msgspec
 
 from hfg.graph.drawing.layout.grid import Axis, Grid
 from hfg.graph.drawing.layout.parts import Link, Side, Spot, Thing
+from hfg.graph.drawing.layout.searching import search
 
 __all__ = ["End", "Leg", "corners", "ends_of", "route"]
 
@@ -133,10 +134,9 @@ class _Router:
                 for legs in self._between(begin, end, tail, head):
                     found = True
                     yield legs
-        if not found and not straight:  # the user has put things next to each other: there is no way around
-            yield (
-                [*begins[:1], *ends[:1]] if begins and ends and begins[0][0] != ends[0][0] else begins[:1] or [("x", 0)]
-            )
+        if not found and not straight:
+            ends_ = [(end.strip_x, end.strip_y, end.is_level) for end in (tail, head)]
+            yield search(self.grid, *ends_) or []  # without any way the line runs below what the user has put there
 
     def _rays(self, end: End, net: int) -> Iterator[Leg]:
         """Yield the channels into which a line may turn that goes straight on from its port."""

@@ -240,5 +240,11 @@ def _name(thing: Thing, view: View, kind: Kind) -> None:
         elif spot.side in ("top", "bottom"):
             if count > 1 or is_box or (kind == "all" and not spot.is_plain):
                 spot.says = spot.name
-        elif spot.kind == "parameter" or view.all_ports or is_box or is_hub or (kind == "all" and not spot.is_plain):
+        elif (
+            spot.kind == "parameter"
+            or (view.all_ports and not view.measured)
+            or is_box
+            or is_hub
+            or (kind == "all" and not spot.is_plain)
+        ):
             spot.says = spot.name
