@@ -89,6 +89,10 @@ class Bench:
         async def end() -> None:
             await self.studio.close()
             await self.server.stop()
+            left = asyncio.all_tasks() - {asyncio.current_task()}  # a level may just be laid out
+            for task in left:
+                task.cancel()
+            await asyncio.gather(*left, return_exceptions=True)
 
         asyncio.run_coroutine_threadsafe(end(), self._loop).result(patience(10))
         self._loop.call_soon_threadsafe(self._loop.stop)

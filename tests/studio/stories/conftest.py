@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import shutil
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 import hfg
+from hfg.studio.palette import search_types
 from tests.limits import patience
 from tests.studio.stories.bench import Bench, Story
 from tests.studio.stories.graphs import mission
@@ -45,11 +48,18 @@ def browser() -> Iterator[Browser]:
         browser.close()
 
 
+@pytest.fixture(scope="session")
+def catalogue() -> None:
+    """Read the node types once: the first search of a process waits for that."""
+    with ThreadPoolExecutor(1) as thread:  # the browser has a loop in this one
+        thread.submit(lambda: asyncio.run(search_types(hfg.Graph("empty"), "threshold", "", "", 1))).result()
+
+
 Open = Callable[..., Story]
 
 
 @pytest.fixture
-def open_studio(browser: Browser, tmp_path: Path) -> Iterator[Open]:
+def open_studio(browser: Browser, catalogue: None, tmp_path: Path) -> Iterator[Open]:
     """Open a studio of a graph in the browser."""
     benches: list[Bench] = []
     stories: list[Story] = []

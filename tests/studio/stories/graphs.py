@@ -13,7 +13,7 @@ from annotated_types import Ge, Interval
 import hfg
 from hfg.images import Gray
 
-__all__ = ["Collect", "Drive", "Errand", "Stamp", "count", "fails_at", "halves", "mission", "picture", "scaled"]
+__all__ = ["Collect", "Drive", "Errand", "Stamp", "count", "fails_at", "halves", "look", "mission", "picture", "scaled"]
 
 
 @hfg.node
@@ -40,6 +40,11 @@ def picture(value: int) -> Gray:
     image = np.zeros((48, 64), np.uint8)
     image[8:24, 8:24] = 200
     return image
+
+
+@hfg.node
+def look(image: Gray) -> None:
+    """Take a picture."""
 
 
 @hfg.node
@@ -109,7 +114,7 @@ def mission() -> hfg.Graph:
     graph.add(Stamp(), name="stamp")
     graph.add(Collect(), name="spare")
     numbers >> scale >> check >> store
-    numbers >> draw
+    numbers >> draw >> graph.add(look(), name="look")
     errand, rest = graph.add(Errand(), name="errand"), graph.add(Drive(), name="rest")
     graph.start.activates(errand.begin)
     errand.done.activates(rest.begin)

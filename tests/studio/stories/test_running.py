@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 def test_all_nodes_of_the_graph_are_on_the_page(story: Story) -> None:
     for path in story.graph.nodes:
         expect(story.node(path)).to_be_visible()
-    expect(story.page.locator("#status")).to_contain_text("11 nodes")
+    expect(story.page.locator("#status")).to_contain_text("12 nodes")
 
 
 def test_space_starts_the_graph_and_the_page_shows_its_time(story: Story) -> None:

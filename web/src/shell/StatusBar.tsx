@@ -1,13 +1,8 @@
 import { useEffect, useState } from "react";
-import { socket } from "../state/link";
+import { useLoad } from "../live/load";
 import { groupClass } from "../state/looking";
 import { change, useStudio } from "../state/studio";
 import { counted, moment, percent, plural } from "../ui/words";
-
-interface Load {
-  firings_hz: number;
-  groups: Record<string, { busy_share: number; rate_hz: number; queued: number }>;
-}
 
 export function StatusBar() {
   const nodes = useStudio((s) => Object.keys(s.tables.nodes).length);
@@ -42,12 +37,8 @@ function Problems() {
 }
 
 function Loads() {
-  const [load, setLoad] = useState<Load | null>(null);
+  const load = useLoad((s) => s.load);
   const tables = useStudio((s) => s.tables);
-  useEffect(() => {
-    const subscription = socket.subscribe("load", {}, 2, (value) => setLoad(value as Load));
-    return subscription.end;
-  }, []);
   if (!load) return null;
   return (
     <>

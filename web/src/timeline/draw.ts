@@ -1,3 +1,4 @@
+import { useLoad } from "../live/load";
 import { groupClass } from "../state/looking";
 import { nameOf } from "../state/paths";
 import { studio } from "../state/studio";
@@ -13,6 +14,8 @@ const LANE = 19;
 const TOP = 42;
 const LANES = TOP + 3 * ROW + 4;
 const SLOWEST_S = 0.006;
+/** A ring around less hides it. */
+const RING_PX = 6;
 
 interface Target {
   x: number;
@@ -154,13 +157,14 @@ class Drawing {
     const tables = studio().tables;
     const groups = Object.values(tables.groups).sort((a, b) => a.number - b.number);
     const rows = new Map(groups.map((group, index) => [group.name, LANES + index * LANE]));
+    const loads = useLoad.getState().load?.groups ?? {};
     for (const group of groups) {
       const y = rows.get(group.name)!;
       this.c.fillStyle = colour(groupClass(tables, group.name).split(" ")[0] || "loop");
       this.c.fillRect(12, y + 5, 8, 8);
       this.text(group.name, 26, y + 9.5, "ink2", 600);
       this.c.textAlign = "right";
-      this.text(percent(record.loads.get(group.name) ?? 0), GUTTER - 8, y + 9.5, "ink3");
+      this.text(percent(loads[group.name]?.busy_share ?? 0), GUTTER - 8, y + 9.5, "ink3");
       this.c.textAlign = "left";
       this.c.fillStyle = colour("line");
       this.c.fillRect(GUTTER, y + 15, this.width - GUTTER - RIGHT, 1);
@@ -178,9 +182,10 @@ class Drawing {
     const left = Math.max(GUTTER, this.x(begin));
     const wide = Math.max(1, this.x(end) - left);
     const tall = scale.length < 3 ? 13 : Math.max(3, 13 * Math.min(1, Math.max(0.28, (end - begin) / SLOWEST_S)));
-    this.c.fillStyle = colour(token);
+    const chosen = this.isChosen(node);
+    this.c.fillStyle = colour(chosen && wide < RING_PX ? "you" : token);
     this.c.fillRect(left, y + 15 - tall, wide, tall);
-    if (this.isChosen(node)) this.ring(left, y + 1, wide, 13);
+    if (chosen && wide >= RING_PX) this.ring(left, y + 1, wide, 13);
     if (wide > 30) {
       this.c.font = `500 10.5px ${colour("font")}`;
       const name = nameOf(node);

@@ -19,13 +19,12 @@ export interface Record {
   boxes: Box[];
   spans: Span[];
   now: number;
-  loads: Map<string, number>;
   /** Counts what has arrived. */
   turn: number;
 }
 
 /** What the timeline shows lives outside of React; a frame of the screen draws it. */
-export const record: Record = { boxes: [], spans: [], now: 0, loads: new Map(), turn: 0 };
+export const record: Record = { boxes: [], spans: [], now: 0, turn: 0 };
 
 interface Window {
   follows: boolean;
@@ -43,7 +42,7 @@ let run = -1;
 export function watchTimeline(number: number): () => void {
   if (number !== run) {
     run = number;
-    Object.assign(record, { boxes: [], spans: [], now: 0, loads: new Map(), turn: record.turn + 1 });
+    Object.assign(record, { boxes: [], spans: [], now: 0, turn: record.turn + 1 });
   }
   watching++;
   subscription ??= socket.subscribe("timeline", {}, 15, (value) => heard(value as Frame));
@@ -61,7 +60,6 @@ function heard(frame: Frame): void {
   if (record.boxes.length > MOST_BOXES) record.boxes = record.boxes.slice(-MOST_BOXES / 2);
   record.now = frame.now;
   record.turn++;
-  measureLoads();
 }
 
 /** Both, once each: what the studio has kept, and what has begun since. */
@@ -92,16 +90,3 @@ function noteActivity(frame: ActivityFrame): void {
 }
 
 onActivity(noteActivity);
-
-const LOAD_S = 5;
-
-function measureLoads(): void {
-  const from = record.now - LOAD_S;
-  const busy = new Map<string, number>();
-  for (let index = record.boxes.length - 1; index >= 0; index--) {
-    const [, group, begin, end] = record.boxes[index]!;
-    if (end < from) break;
-    busy.set(group, (busy.get(group) ?? 0) + end - Math.max(from, begin));
-  }
-  record.loads = new Map([...busy].map(([group, spent]) => [group, spent / LOAD_S]));
-}
