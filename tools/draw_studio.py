@@ -22,18 +22,24 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "pictures" / "studio"
 ROBOT = "examples.fetch_delivery.mission:build"
 WINDOW = {"width": 1440, "height": 900}
-START_S = 60.0
+PATIENCE_S = 120.0  # the robot works meanwhile
 
 
 def _settle(page: Page) -> None:
     page.wait_for_timeout(1500)
 
 
+def _look_away(page: Page) -> None:
+    """Move the mouse to where it marks nothing."""
+    page.mouse.move(1000, 560)
+
+
 def _mission(page: Page) -> None:
     """The mission at work, with a node of it in the inspector."""
     page.locator('[data-node="robot_0"]').dblclick(position={"x": 20, "y": 28})
-    page.locator('[data-node="robot_0/fetch"].active').wait_for(timeout=1000 * START_S)
+    page.locator('[data-node="robot_0/fetch"].active').wait_for()
     page.locator('[data-node="robot_0/advance"] .t b').click()
+    _look_away(page)
 
 
 def _inside(page: Page) -> None:
@@ -42,6 +48,7 @@ def _inside(page: Page) -> None:
     page.locator('[data-node="robot_0/fetch/visit"]').wait_for()
     page.locator('[data-node="robot_0/fetch/visit"] .t b').dblclick()
     page.locator('[data-node="robot_0/fetch/visit/position"] .t b').click()
+    _look_away(page)
 
 
 def _palette(page: Page) -> None:
@@ -87,12 +94,13 @@ def main() -> None:
             assert studio.stdout is not None
             found = next(one for line in studio.stdout if (one := re.search(r"http://\S+", line)))
             with tool.chromium.launch(executable_path=browser, args=["--no-sandbox", "--disable-gpu"]) as started:
-                page = started.new_page(viewport=WINDOW, color_scheme="light", device_scale_factor=1.5)
+                page = started.new_page(viewport=WINDOW, color_scheme="light")
+                page.set_default_timeout(1000 * PATIENCE_S)
                 page.goto(found[0])
                 for name, act in PICTURES.items():
                     act(page)
                     for theme in ("light", "dark"):
-                        page.evaluate("theme => { document.documentElement.dataset.theme = theme }", theme)
+                        page.evaluate(f"document.querySelector('[aria-label=\"Show the {theme} theme\"]')?.click()")
                         _settle(page)
                         page.screenshot(path=FOLDER / f"{name}-{theme}.png")
         finally:

@@ -138,3 +138,11 @@ def test_no_request_leaves_the_machine(story: Story) -> None:
     base = story.bench.address.partition("/?")[0]
     assert asked
     assert [url for url in asked if not url.startswith((base, "blob:", "data:"))] == []
+
+
+def test_what_one_chooses_in_a_level_takes_the_place_of_the_choice_outside(story: Story) -> None:
+    story.select("errand")
+    story.press("Enter")
+    story.node("errand/there").wait_for()
+    story.select("errand/there")
+    expect(story.page.locator("#side h2").first).to_have_text("there")

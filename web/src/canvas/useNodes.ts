@@ -47,14 +47,15 @@ export function useNodes(layout: LayoutRecord | undefined) {
     setNodes((before) => applyNodeChanges(changes, before));
     const picks = changes.filter((one) => one.type === "select");
     if (picks.length === 0) return;
-    const next = new Set(studio().selection);
+    const here = new Set(layout?.nodes.map((box) => box.id));
+    const next = new Set([...studio().selection].filter((path) => here.has(path))); // what lies elsewhere was a choice of before
     for (const one of picks) {
       if (one.selected) next.add(one.id);
       else next.delete(one.id);
     }
     const before = studio().selection;
     if (next.size !== before.size || [...next].some((path) => !before.has(path))) select(next);
-  }, []);
+  }, [layout]);
 
   const onDragStart = useCallback((_: unknown, __: HfgNode, dragged: HfgNode[]) => {
     dragging.current = true;
