@@ -32,6 +32,7 @@ __all__ = [
     "Named",
     "Pixels",
     "Shape",
+    "Widget",
     "accepts",
     "array_facts",
     "bare_type",
@@ -120,6 +121,37 @@ class Named:
 
     def __repr__(self) -> str:
         return f"Named({self.name!r})"
+
+
+class Widget:
+    """Metadata of a port's type: how editors should show its values; it does not affect matching.
+
+    Editors find it in the catalogue. Those that do not know the kind ignore it.
+
+    Examples:
+      >>> from typing import Annotated
+      >>> Widget.of(Annotated[float, Widget("gauge")])
+      'gauge'
+    """
+
+    __slots__ = ("kind",)
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+
+    @staticmethod
+    def of(hint: Any) -> str:
+        """Return the kind of widget of a type; "" if it has none."""
+        return next((one.kind for one in getattr(hint, "__metadata__", ()) if isinstance(one, Widget)), "")
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Widget) and other.kind == self.kind
+
+    def __hash__(self) -> int:
+        return hash((Widget, self.kind))
+
+    def __repr__(self) -> str:
+        return f"Widget({self.kind!r})"
 
 
 def _axes_meet(mine: tuple[int | None, ...], theirs: tuple[int | None, ...]) -> bool:

@@ -19,7 +19,7 @@ from hfg.nodetypes.description import EventSpec, NodeType
 from hfg.nodetypes.functions import NodeFunction
 from hfg.nodetypes.node import Node
 from hfg.ports.specs import REQUIRED, ParameterSpec
-from hfg.types import describe
+from hfg.types import Widget, describe
 
 __all__ = [
     "ErrorDescription",
@@ -54,6 +54,7 @@ class PortDescription(msgspec.Struct, frozen=True):
       while_active: a slot that accepts signals only while its node is active.
       vector: it represents several ports of this kind, "values[0]", "values[1]" ...; the parameter of its name has
         their number.
+      widget: how editors should show its values, if its type has an `hfg.types.Widget`.
     """
 
     name: str
@@ -63,6 +64,7 @@ class PortDescription(msgspec.Struct, frozen=True):
     default: Any = None
     while_active: bool = False
     vector: bool = False
+    widget: str = ""
 
 
 class ParameterDescription(msgspec.Struct, frozen=True):
@@ -277,6 +279,7 @@ def _ports(specs: Iterable[Any], kind: NodeType, read: Documentation) -> Iterato
             spec.default if optional else None,
             getattr(spec, "while_active", False),
             bool(bracket),
+            Widget.of(spec.type),
         )
 
 

@@ -50,7 +50,8 @@ class Edge:
         source's region. Without meaning for event edges.
       tap: called with every token that is put on the edge; None without observers.
       via: the scopes (subgraphs) whose relays it passes; all must be enabled.
-      segments: the drawn edges that it consists of, from source to target; empty if it comes from outside the graph.
+      segments: the declared edges that it consists of, from source to target; empty if it comes from outside the graph.
+      options: the declared `EdgeOptions`; None if it comes from outside.
       source_port, target_port: the bound ports at its ends; an observable is its own port.
     """
 
@@ -66,6 +67,7 @@ class Edge:
         "live",
         "lost",
         "mandatory",
+        "options",
         "port_name",
         "position",
         "segments",
@@ -104,6 +106,7 @@ class Edge:
         self.ended = False
         self.via: tuple[Any, ...] = ()
         self.segments: tuple[Any, ...] = ()
+        self.options: Any = None
         self.source_port: Any = None
         self.target_port: Any = None
         self.handler: Callable[[Any], Any] | None = None
@@ -128,9 +131,12 @@ class Edge:
         self.handler = handler
         self.while_active = while_active
 
-    def stand_for(self, segments: tuple[Any, ...], source_port: Any, target_port: Any, via: tuple[Any, ...]) -> None:
-        """Set what the edge represents in the drawn graph."""
+    def stand_for(
+        self, segments: tuple[Any, ...], source_port: Any, target_port: Any, via: tuple[Any, ...], options: Any
+    ) -> None:
+        """Set what the edge represents in the declared graph, and its options there."""
         self.segments = segments
+        self.options = options
         self.source_port = source_port
         self.target_port = target_port
         self.via = via

@@ -12,6 +12,7 @@ from annotated_types import Interval, Len, MultipleOf, Predicate, Unit
 import hfg
 from hfg.catalogue import TypeDescription, categories, describe_type, named, undocumented
 from hfg.catalogue.documentation import read_documentation
+from hfg.types import Widget
 
 
 @hfg.node
@@ -179,3 +180,25 @@ def test_categories_are_in_order(types: list[TypeDescription]) -> None:
 @pytest.mark.parametrize("module", ["describing", "documentation", "offers", "searching"])
 def test_examples_in_docstrings_run(module: str) -> None:
     assert doctest.testmod(importlib.import_module(f"hfg.catalogue.{module}")).failed == 0
+
+
+def test_a_hint_for_a_widget_at_a_port_arrives_in_the_catalogue() -> None:
+    class Motor(hfg.Node):
+        """Has a speed."""
+
+        speed = hfg.Output(Annotated[float, Widget("gauge")])
+        load = hfg.Event(Annotated[int, Widget("bar")])
+        on = hfg.Input(bool)
+
+        def process(self, on: bool) -> None:
+            self.speed.send(1.0)
+
+    described = describe_type(Motor)
+    assert [port.widget for _, port in described.ports() if port.name in ("speed", "load", "on")] == [
+        "",
+        "gauge",
+        "bar",
+    ]
+    assert described.outputs[0].type == "float"
+    graph = hfg.Graph()
+    graph.connect(graph.add(Motor()).speed, graph.output("seen", float))  # it does not affect matching

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import hfg
+import tests.files.programs  # noqa: F401 - files may name types of modules that are imported
 from hfg.files import describe, load, save, text_of
 
 FOLLOW = """\

@@ -275,7 +275,7 @@ def make_edge(core: Core, flat: FlatEdge, ends: Ends) -> Any:
 
 def describe(edge: Any, flat: FlatEdge, ends: Ends) -> None:
     """Note what a running edge stands for in the drawn graph."""
-    edge.stand_for(flat.segments, flat.source.port, flat.target.port, ends.scopes_of(flat))
+    edge.stand_for(flat.segments, flat.source.port, flat.target.port, ends.scopes_of(flat), flat.options)
 
 
 def wire(edge: Any, flat: FlatEdge) -> None:
