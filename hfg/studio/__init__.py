@@ -5,7 +5,7 @@
     following    keeps the tables as the graph and its run are     history, words   edits as people read them
     spans        when nodes were active, and by which edges activity moves
     targets      where an edge may lead, and why not               palette     node types that words and a wire fit
-    viewing      one page: its frames, its subscriptions, its credits
+    viewing      one page: its frames, subscriptions, credits      budget      how much of the graph's time it may take
     topics       what pages subscribe to: activity, measures, values, timeline, log
     showing      a value for people         logs       log records          conditions  of breakpoints, as data
     steering     the run: start, pause, steps, breakpoints         failing     what a run failed with

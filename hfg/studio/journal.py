@@ -55,14 +55,14 @@ class Journal:
       offer: how many edits another studio has left, and when; None if none.
     """
 
-    def __init__(self, folder: Path, file: Path | None, base: str) -> None:
+    def __init__(self, folder: Path, file: Path | None, base: str, *, keep: bool = True) -> None:
         name = "graph" if file is None else file.name
         self.path = (folder if file is None else file.parent) / f".{name}.hfg-journal"
         self._base = base
         self._begun = False
         self._done = self._undone = 0  # steps that a new studio could undo and redo as well
-        self._broken = False
-        self.offer = self._found()
+        self._broken = not keep
+        self.offer = self._found() if keep else None
 
     def _found(self) -> tuple[int, float] | None:
         try:
@@ -123,14 +123,22 @@ class Journal:
             return
         try:
             if not self._begun:
-                with suppress(FileNotFoundError):
-                    self.path.unlink()
+                self._set_aside()
                 self._append(_Line(base=self._base))
                 self._begun, self.offer = True, None
             self._append(line)
         except OSError as error:
             self._broken = True
             _LOGGER.warning("unsaved edits are not kept in %s: %s", self.path, error.strerror)
+
+    def _set_aside(self) -> None:
+        """Edits that were offered and neither taken up nor dropped stay, in a file next to it."""
+        if self.offer is not None:
+            aside = self.path.with_name(f"{self.path.name}-before")
+            _LOGGER.warning("unsaved edits of an earlier studio, which were not taken up, are in %s", aside)
+            self.path.replace(aside)
+        else:
+            self.path.unlink(missing_ok=True)
 
     def _append(self, line: _Line) -> None:
         file = GrowingFile(self.path, append=True, at_once=True)
@@ -174,11 +182,13 @@ class Journal:
 
     def drop(self) -> None:
         """Its edits are saved or given up: remove it."""
-        self.offer = None
-        self.close(keep=False)
+        if self.offer is not None or self._begun:
+            self._begun, self.offer = True, None
+            self.close(keep=False)
+        self._begun = False
 
     def close(self, *, keep: bool) -> None:
         """Write no more."""
-        if not keep and self.offer is None:
+        if not keep and self._begun:
             with suppress(OSError):
                 self.path.unlink()

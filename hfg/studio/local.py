@@ -118,5 +118,5 @@ def visit(door: Any, transport: asyncio.Transport) -> _Visit:
     """Let a program steer the run of a door; all such programs share one studio."""
     if door.studio is None:
         graph = door.run.graph
-        door.studio = Studio(Project(graph, Path.cwd()), run=door.run)
+        door.studio = Studio(Project(graph, Path.cwd(), keep=False), run=door.run)
     return _Visit(door.studio, transport)

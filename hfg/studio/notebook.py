@@ -49,7 +49,7 @@ class StudioPage:
 def serve_run(run: Run, *, port: int | None = None, read_only: bool = False) -> StudioPage:
     """Implement `Run.studio`."""
     why = "You may look, not change: the studio was opened with read_only=True." if read_only else ""
-    studio = Studio(Project(run.graph, Path.cwd()), read_only=why, run=run)
+    studio = Studio(Project(run.graph, Path.cwd(), keep=False), read_only=why, run=run)
     server = Server(StudioDoor(asyncio.get_running_loop(), studio), host="localhost", port=port, embedded=True)
     server.start()
     return StudioPage(studio, server)

@@ -44,7 +44,18 @@ class Project:
         *,
         allow: Iterable[str] = (),
         read: Callable[[Path], Graph] | None = None,
+        keep: bool = True,
     ) -> None:
+        """Take a graph that was read already.
+
+        Args:
+          graph: the whole graph.
+          folder: nothing outside of it is opened or written.
+          file: where the graph comes from.
+          allow: packages that files and commands may import besides.
+          read: reads a file; by default only graph files.
+          keep: keep unsaved edits in a journal; not for a run that another program has begun.
+        """
         self.graph = graph
         self.folder = folder.resolve()
         self.file = None if file is None else file.resolve()
@@ -55,7 +66,11 @@ class Project:
         self._print = self._fingerprint()
         self._elsewhere = ""
         self._seen = self._stat()
-        self.journal = Journal(self.folder, self.file, self._print)
+        self._keeps = keep
+        self.journal = self._new_journal()
+
+    def _new_journal(self) -> Journal:
+        return Journal(self.folder, self.file, self._print, keep=self._keeps)
 
     # --- what pages see ---
 
@@ -156,7 +171,7 @@ class Project:
         self.journal.drop()
         self.graph, self.file = graph, file
         self._now_saved()
-        self.journal = Journal(self.folder, self.file, self._print)
+        self.journal = self._new_journal()
 
     def save(self, path: str, *, force: bool) -> None:
         """Write the file, or another one.
@@ -183,7 +198,7 @@ class Project:
         self.journal.drop()
         self.file = file
         self._now_saved()
-        self.journal = Journal(self.folder, self.file, self._print)
+        self.journal = self._new_journal()
 
     def _now_saved(self) -> None:
         done = history_of(self.graph).done
@@ -199,7 +214,7 @@ class Project:
             self.journal.replay(self.graph, self.allow)
         else:
             self.journal.drop()
-            self.journal = Journal(self.folder, self.file, self._print)
+            self.journal = self._new_journal()
 
     def close(self) -> None:
         """The studio ends; what is not saved stays in the journal."""

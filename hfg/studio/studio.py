@@ -16,6 +16,7 @@ from typing import Any, Final
 from hfg.base.logs import Log
 from hfg.engine import Run
 from hfg.errors import HfgError
+from hfg.studio.budget import metered
 from hfg.studio.describing import automatic_ports
 from hfg.studio.following import Following
 from hfg.studio.messages import (
@@ -112,8 +113,8 @@ class Studio(Following):
         """A page says something."""
         if viewer.number not in self.viewers:
             return
-        if not viewer.joined and not isinstance(message, Join):
-            viewer.send_away(1008, f"{SUBPROTOCOL} begins with join")
+        if viewer.joined == isinstance(message, Join):  # a snapshot is not for free
+            viewer.send_away(1008, f"{SUBPROTOCOL} begins with one join")
             return
         match message:
             case Join():
@@ -199,12 +200,15 @@ class Studio(Following):
         if viewer.pending >= MOST_REQUESTS:
             viewer.send(Reject(message.id, "busy", f"{MOST_REQUESTS} requests of this page wait for an answer already"))
             return
+        if viewer.budget.is_over():
+            viewer.send(Reject(message.id, "busy", "this page asks for more than its share of the graph's time; wait"))
+            return
         viewer.pending += 1
         self._begin(self._answer(viewer, message))
 
     async def _answer(self, viewer: Viewer, message: Request) -> None:
         try:
-            viewer.send(await answer(self, viewer, message))
+            viewer.send(await metered(answer(self, viewer, message), viewer.budget))
         except HfgError as error:
             viewer.send(reject(message.id, error))
         except Exception as error:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple, Protocol
 
 from hfg.errors import HfgError
+from hfg.studio.budget import Budget
 from hfg.studio.messages import HEADER, Data, Gone, encode
 
 __all__ = ["Frame", "Outbox", "Subscription", "Topic", "Viewer"]
@@ -115,6 +116,7 @@ class Viewer:
       visible: it is not in a hidden tab.
       levels: what it shows: levels and views.
       pending: requests that are not answered yet.
+      budget: of its requests.
     """
 
     def __init__(self, number: int, outbox: Outbox) -> None:
@@ -123,6 +125,7 @@ class Viewer:
         self.visible = True
         self.levels: set[tuple[str, str]] = set()
         self.pending = 0
+        self.budget = Budget()
         self.subscriptions: dict[int, Subscription] = {}
         self._outbox = outbox
 

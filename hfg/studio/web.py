@@ -69,7 +69,7 @@ class PageOutbox:
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._frames: deque[Frame] = deque()
-        self._bytes = 0
+        self._put = self._sent = 0  # bytes; each is written by one thread only
         self._wake = asyncio.Event()
         self._end: tuple[int, str] | None = None
 
@@ -78,10 +78,10 @@ class PageOutbox:
         size = 0 if callable(frame.data) else len(frame.data)
         if self._end is not None:
             return
-        if self._frames and (len(self._frames) >= _MOST_FRAMES or self._bytes + size > _MOST_BYTES):
+        if self._frames and (len(self._frames) >= _MOST_FRAMES or self._put - self._sent + size > _MOST_BYTES):
             self.close(1013, "the page is too slow; it comes back by itself")
             return
-        self._bytes += size
+        self._put += size
         self._frames.append(frame)
         self._call(self._wake.set)
 
@@ -108,7 +108,7 @@ class PageOutbox:
                 if callable(data):
                     data = await asyncio.to_thread(data) if frame.is_binary else data()
                 else:
-                    self._bytes -= len(data)
+                    self._sent += len(data)
                 await (socket.send_bytes(data) if frame.is_binary else socket.send_text(data.decode()))
             if self._end is not None:
                 await socket.close(*self._end)

@@ -180,6 +180,17 @@ def test_edits_survive_the_sudden_end_of_the_studio(file: Path) -> None:
     live(main)
 
 
+def test_edits_that_were_offered_stay_if_one_goes_on_without_them(file: Path) -> None:
+    async def main() -> None:
+        await Page(opened(file)).join().edit(SET)
+        journal = file.parent / f".{file.name}.hfg-journal"
+        before = journal.read_bytes()
+        await Page(opened(file)).join().edit(add("more"))
+        assert journal.with_name(f"{journal.name}-before").read_bytes() == before
+
+    live(main)
+
+
 def test_edits_that_are_dropped_are_not_offered_again(file: Path) -> None:
     async def main() -> None:
         await Page(opened(file)).join().edit(SET)

@@ -544,3 +544,59 @@ def test_each_view_of_a_subgraph_is_a_layout_of_its_own() -> None:
         await page.until(lambda: "all:box" not in page.tables["layouts"])
 
     live(main)
+
+
+# --- hostile pages ---
+
+
+def test_a_page_that_asks_for_too_much_has_to_wait_and_others_have_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hfg.studio.budget._SHARE", 0.0)  # nothing is paid back during the test
+    monkeypatch.setattr("hfg.studio.budget._MOST_S", 0.01)
+
+    async def main() -> None:
+        studio = studio_of(doubling())
+        greedy, other = Page(studio).join(), Page(studio).join()
+        answers = [await greedy.ask("ask", what="targets", args={"port": "source.out"}) for _ in range(300)]
+        assert answers[0]["t"] == "answer"
+        assert answers[-1]["code"] == "busy"
+        assert (await other.ask("ask", what="targets", args={"port": "source.out"}))["t"] == "answer"
+
+    live(main)
+
+
+@pytest.mark.parametrize("again", [True, False])
+def test_a_page_says_join_first_and_once(again: bool) -> None:
+    async def main() -> None:
+        page = Page(studio_of(doubling()))
+        if again:
+            page.join().say(t="join")
+        else:
+            page.say(t="visible", on=True)
+        assert page.closed == (1008, "hfg.studio.v1 begins with one join")
+
+    live(main)
+
+
+def test_requests_that_are_not_answered_yet_are_bounded() -> None:
+    async def main() -> None:
+        page = Page(studio_of(ticking())).join()
+        async with page.studio.turn:
+            asked = [asyncio.ensure_future(page.ask("undo")) for _ in range(150)]
+            await asyncio.sleep(0)
+        answers = await asyncio.gather(*asked)
+        assert {answer["code"] for answer in answers} == {"busy", "usage"}
+
+    live(main)
+
+
+def test_markup_in_names_and_values_is_only_text() -> None:
+    async def main() -> None:
+        markup = "<img src=x onerror=alert(1)>"
+        page = Page(studio_of(doubling())).join()
+        note = {"do": "Note", "path": "scaled", "name": "comment", "value": markup}
+        assert (await page.edit(note))["t"] == "ack"
+        assert page.tables["nodes"]["scaled"]["notes"] == {"comment": markup}
+        assert (await page.edit(add(markup)))["t"] == "ack"
+        assert page.tables["nodes"][markup]["name"] == markup
+
+    live(main)
