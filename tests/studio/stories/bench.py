@@ -68,11 +68,10 @@ class Bench:
         """Wait until the run is in one of these states."""
         self.until(lambda: self.studio.steering.record.state in states, f"the run is {' or '.join(states)}")
 
-    @property
-    def active(self) -> set[str]:
-        """The nodes that are active now."""
+    def is_active(self, path: str) -> bool:
+        """Whether a node is active now; asked on the studio's loop."""
         run = self.studio.steering.run
-        return set() if run is None else set(self.call(run.active))
+        return run is not None and path in run.active()
 
     def cut(self) -> None:
         """The network is gone, the studio lives on."""

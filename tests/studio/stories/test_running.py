@@ -64,7 +64,7 @@ def test_whoever_has_the_activity_has_the_ring(story: Story) -> None:
     story.start()
     rest = story.node("rest")
     expect(rest).to_have_class(re.compile(r"\bactive\b"))
-    assert "rest" in story.bench.active
+    assert story.bench.call(lambda: story.bench.is_active("rest"))
     story.bench.call(lambda: setattr(story.graph["rest"], "duration", 0.1))
     expect(story.node("errand")).to_contain_text(re.compile("there|back"))
     expect(story.node("errand")).to_have_class(re.compile(r"\bactive\b"))
@@ -75,7 +75,7 @@ def test_the_reset_of_activity_begins_at_the_start_again(story: Story) -> None:
     story.press("Control+k")
     story.page.keyboard.type("reset the act")
     story.press("Enter")
-    story.bench.until(lambda: "errand/there" in story.bench.studio.steering.run.active())
+    story.bench.until(lambda: story.bench.is_active("errand/there"))
 
 
 def test_a_breakpoint_pauses_where_it_is_set(story: Story) -> None:
