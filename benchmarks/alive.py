@@ -260,11 +260,11 @@ def hops(watch: Stopwatch) -> hfg.Graph:
     return graph
 
 
-def ring(watch: Stopwatch) -> hfg.Graph:
-    """Activity goes round the ten, one event a wave."""
+def ring(watch: Stopwatch, *, against: bool = False) -> hfg.Graph:
+    """Activity goes round the ten by events: along the wave, ten of them each; or against it, one a wave."""
     graph = hfg.Graph("ring")
     nodes = chain(graph, graph.add(watch.source()).out, lambda _: Steps())
-    for before, behind in pairwise([*nodes, nodes[0]]):
+    for before, behind in pairwise([nodes[0], *reversed(nodes)] if against else [*nodes, nodes[0]]):
         before.go.activates(behind.begin)
     graph.start.activates(nodes[0].begin)
     return graph
@@ -313,7 +313,8 @@ GRAPHS: dict[str, tuple[Callable[[Stopwatch], hfg.Graph], float]] = {
     "a time-out every 1,000": (timed_out, 1.5),
     "silent source": (silent, 0.6),
     "silent region": (silent_head, 1.5),
-    "activity goes over edges": (hops, 3.0),
-    "activity goes by events": (ring, 3.0),
+    "activity goes over ten edges": (hops, 30.0),
+    "activity goes by ten events": (ring, 30.0),
+    "activity goes by an event": (lambda watch: ring(watch, against=True), 3.0),
 }
 """By name: what it is made by, and at most how much of the flat chain's time it may take."""
