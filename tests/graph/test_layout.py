@@ -157,8 +157,8 @@ def test_gates_and_time_outs_are_marks_on_their_node() -> None:
 def test_ports_of_the_level_are_tags_where_they_are_used() -> None:
     drawn = laid("delivery", "mission")
     tags = [name for line in drawn.lines if line.tag is not None and line.tag.text for name in line.tag.ports]
-    assert tags.count("odometry") == 5
-    assert tags.count("scan") == 6
+    assert tags.count("robot_0.odometry.inner") == 5
+    assert tags.count("robot_0.scan.inner") == 6
 
 
 def test_edges_between_the_same_two_places_are_a_bundle_with_their_number() -> None:

@@ -93,7 +93,7 @@ class Tag(msgspec.Struct, frozen=True):
 
     Attributes:
       text: what is written.
-      ports: the ports that it stands for, by name.
+      ports: the paths of the ports that it stands for.
       x: of its rectangle, as y, width and height.
     """
 

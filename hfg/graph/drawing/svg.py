@@ -309,7 +309,7 @@ def _tag(tag: Tag) -> str:
     dashed = "" if tag.kind in ("input", "output") else " hfg-dashed"
     place = f'x="{_n(tag.x)}" y="{_n(tag.y)}" width="{_n(tag.width)}" height="{_n(tag.height)}"'
     text = _text(tag.x + tag.width / 2, tag.y + tag.height / 2 + 3.6, tag.text, TAG, "middle", soft=True)
-    told = f"<title>{escaped(', '.join(tag.ports))}</title>"
+    told = f"<title>{escaped(', '.join(port.removesuffix('.inner') for port in tag.ports))}</title>"
     return f'<g class="hfg-tag">{told}<rect class="hfg-pill{dashed}" {place} rx="7"/>{text}</g>\n'
 
 

@@ -51,6 +51,7 @@ _ROW: Final = 16.0  # named ports one below the other
 _COMB: Final = 10.0  # others
 _LEAST: Final = 22.0  # between ports side by side
 _MEASURED: Final = (72.0, 176.0)  # a node with bars
+_BELOW_BARS: Final = 54.0  # there rows of ports begin
 TAG_HEIGHT: Final = 14.0
 
 
@@ -85,7 +86,7 @@ def size(thing: Thing, *, measured: bool, inner: tuple[float, float] | None = No
         max(0.0, *(width_of(shortened(one.says, LONGEST_PORT), PORT) for one in sides[side]), 0.0)
         for side in ("left", "right")
     ]
-    header = _header(thing, sides)
+    header = _BELOW_BARS if measured and thing.shape.look == "node" else _header(thing, sides)
     wide = [_title_width(thing), *(sum(map(room, sides[side])) + _PAD for side in ("top", "bottom"))]
     named = [sides[side] for side in ("left", "right") if _is_named(sides[side])]
     rows = max((len(spots) + sum(bool(one.tagged) and one.is_linked for one in spots) for spots in named), default=0)

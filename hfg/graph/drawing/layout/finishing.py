@@ -98,7 +98,8 @@ def _tagged(things: Sequence[Thing], links: Sequence[Link]) -> Iterator[tuple[li
             at = max((thing.where(one) for one in spots), key=lambda place: place[1])
         else:
             at = thing.where(spot)[0], sum(thing.where(one)[1] for one in spots) / len(spots)
-        points, tag = _tag(spot, at, names, _kind_of_tag(members[0], is_in=is_in))
+        paths = tuple(dict.fromkeys(arrow.ends[not is_in] for link in members for arrow in link.arrows))
+        points, tag = _tag(spot, at, names, paths, _kind_of_tag(members[0], is_in=is_in))
         for number, one in enumerate(spots):
             own = [arrow for link in members if _tag_end(link)[1] is one for arrow in link.arrows]
             way = points if len(spots) == 1 else _to_bar(thing.where(one), points)
@@ -126,7 +127,7 @@ def _kind_of_tag(link: Link, *, is_in: bool) -> str:
     return "event" if link.is_signal else "output"
 
 
-def _tag(spot: Spot, at: Point, names: Sequence[str], kind: str) -> tuple[list[Point], Tag]:
+def _tag(spot: Spot, at: Point, names: Sequence[str], paths: tuple[str, ...], kind: str) -> tuple[list[Point], Tag]:
     """Put a tag in front of a port; next to its line if one leads on from there."""
     x, y = at
     text = tag_text(names, is_in=kind in ("input", "slot", "from"))
@@ -139,14 +140,12 @@ def _tag(spot: Spot, at: Point, names: Sequence[str], kind: str) -> tuple[list[P
         else:
             points = [(x, y), (x + spot.to_tag * sign, y)]
         left = x + spot.to_tag if sign > 0 else x - spot.to_tag - width
-        return points, Tag(text, tuple(names), kind, left, y - half, width, TAG_HEIGHT)
+        return points, Tag(text, paths, kind, left, y - half, width, TAG_HEIGHT)
     if spot.is_linked:
         points = [(x, y), (x, y + 12 * sign), (x + 10, y + 12 * sign)]
-        return points, Tag(text, tuple(names), kind, x + 10, y + 12 * sign - half, width, TAG_HEIGHT)
+        return points, Tag(text, paths, kind, x + 10, y + 12 * sign - half, width, TAG_HEIGHT)
     top = y + spot.to_tag if sign > 0 else y - spot.to_tag - TAG_HEIGHT
-    return [(x, y), (x, y + spot.to_tag * sign)], Tag(
-        text, tuple(names), kind, round(x - width / 2), top, width, TAG_HEIGHT
-    )
+    return [(x, y), (x, y + spot.to_tag * sign)], Tag(text, paths, kind, round(x - width / 2), top, width, TAG_HEIGHT)
 
 
 def _to_bar(port: Point, points: Sequence[Point]) -> list[Point]:
