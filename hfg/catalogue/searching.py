@@ -10,6 +10,7 @@ import difflib
 import functools
 import math
 import re
+import threading
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.resources import files
@@ -22,6 +23,7 @@ if TYPE_CHECKING:  # a search of the stored index needs no description
 
 __all__ = ["Entry", "Index", "categories", "index_of", "named", "near_words", "ranked", "search", "unmatched"]
 
+_STEMMING: Final = threading.Lock()
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_a-zA-Z]+")
 _IDLE_WORDS: Final = (
     "a an and are as at by can do for from get give how i in into is it its me my of on one or several some something "
@@ -136,7 +138,8 @@ def _split(text: str) -> list[str]:
 
 
 def _stemmed(word: str) -> str:
-    stem: str = _stemmer().stemWord(word)
+    with _STEMMING:  # the stemmer keeps the word that it works on
+        stem: str = _stemmer().stemWord(word)
     return stem
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -256,3 +257,19 @@ def test_a_broken_place_is_told_each_time(plugin: Path, tmp_path: Path) -> None:
             'shining_plugin.worse needs the module "no_such_module_at_all", which is not installed',
         )
     assert list(tmp_path.glob("catalogue-*.json")) == []
+
+
+def test_words_are_stemmed_alike_in_several_threads() -> None:
+    """The stemmer of a language keeps the word that it works on, and pages search from threads."""
+    words = [
+        f"{start}{end}" for start in ("threshold", "normal", "connect") for end in ("ing", "ization", "fulness")
+    ] * 40
+    alone = [searching._stemmed(word) for word in words]
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as threads:
+            together = list(threads.map(lambda _: [searching._stemmed(word) for word in words], range(4)))
+    finally:
+        sys.setswitchinterval(interval)
+    assert together == [alone] * 4

@@ -20,24 +20,33 @@ function PaletteAtPlace({ at }: { at: PaletteAt }) {
   const [words, setWords] = useState(at.words);
   const [port, setPort] = useState(at.port);
   const [found, setFound] = useState<Found | null>(null);
+  const [answered, setAnswered] = useState<string | null>(null);
   const [index, setIndex] = useState(0);
-  const asked = useRef(0);
+  const search = useRef({ busy: false, next: null as { words: string; port: string } | null });
   const sends = useStudio((s) => s.tables.nodes[nodeOf(port)]?.ports.find((one) => one.path === port)?.type ?? "");
 
   useEffect(() => {
-    const turn = ++asked.current;
-    question<Found>("search", { words, port, category: "", most: 50 }).then(
-      (next) => {
-        if (turn !== asked.current) return;
-        setFound(next);
+    const state = search.current;
+    const ask = async (asked: { words: string; port: string }) => {
+      state.busy = true; // one search at a time: who types fast is not interested in those between
+      try {
+        setFound(await question<Found>("search", { ...asked, category: "", most: 50 }));
+        setAnswered(asked.words);
         setIndex(0);
-      },
-      (error: Error) => toast(error.message, { kind: "bad" }),
-    );
+      } catch (error) {
+        toast(error instanceof Error ? error.message : String(error), { kind: "bad" });
+      }
+      state.busy = false;
+      const next = state.next;
+      state.next = null;
+      if (next) void ask(next);
+    };
+    if (state.busy) state.next = { words, port };
+    else void ask({ words, port });
   }, [words, port]);
 
   const rows = found?.rows ?? [];
-  const row = rows[index];
+  const row = answered === words ? rows[index] : undefined; // Enter takes nothing that answers other words
   const close = () => change({ popover: null, palette: null });
   const add = (one: FoundRow | undefined, connected: boolean) => {
     if (!one) return;
