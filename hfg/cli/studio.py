@@ -21,6 +21,8 @@ from hfg.engine import PunctualLoop
 from hfg.errors import TargetError
 from hfg.files.opening import SUFFIX
 from hfg.graph import Graph
+from hfg.studio.project import Project
+from hfg.studio.studio import Studio
 
 __all__ = ["studio"]
 
@@ -49,14 +51,10 @@ def studio(
     """Build, watch and steer a graph in the browser."""
     show.set_debug(debug)
     try:
-        from hfg.studio.serving import Server, StudioDoor
+        import hfg.studio.serving  # noqa: F401 - of the extra
     except ImportError as error:
         raise TargetError(f'the studio needs {error.name}: pip install "hfg[studio]"') from None
-    from hfg.studio.palette import warm_up
-    from hfg.studio.project import Project
-    from hfg.studio.studio import Studio
-
-    options = {
+    options: dict[str, Any] = {
         "host": host,
         "port": port,
         "certfile": None if certfile is None else str(certfile),
@@ -75,15 +73,21 @@ def studio(
     folder = Path.cwd() if file is None else file.resolve().parent
     project = Project(graph, folder, file, allow=allow or (), read=lambda path: load_graph(str(path), [], allow))
     why = "You may look, not change: the studio was started with --read-only." if read_only else ""
+    return _serve(Studio(project, read_only=why, target=target or graph.name), options, browser, at_once=run)
+
+
+def _serve(made: Studio, options: Mapping[str, Any], browser: bool, *, at_once: bool) -> int:
+    """Serve pages of a graph of this process, until Ctrl-C."""
+    from hfg.studio.palette import warm_up
+    from hfg.studio.serving import Server, StudioDoor
 
     async def main() -> None:
-        made = Studio(project, read_only=why, target=target or graph.name)
         server = Server(StudioDoor(asyncio.get_running_loop(), made), **options)
         server.start()
         threading.Thread(target=warm_up, name="hfg studio palette", daemon=True).start()
         _show(server.address, browser)
         try:
-            if run:
+            if at_once:
                 await made.steering.start(stay=False)
             await asyncio.Event().wait()
         finally:

@@ -17,9 +17,9 @@ from hfg.studio.palette import search_types, type_of_reference
 from hfg.studio.places import place_at
 from hfg.studio.refusing import Refused
 from hfg.studio.running_elsewhere import runs_of_this_user
+from hfg.studio.sampled_topics import node_measures
 from hfg.studio.showing import shown_value
 from hfg.studio.targets import targets
-from hfg.studio.topics import node_measures
 
 __all__ = ["ask"]
 

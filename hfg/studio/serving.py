@@ -96,23 +96,8 @@ class Server:
             host, port, encrypted=encrypted, names=names, embedded=embedded, secret=secret_of_port(port)
         )
         self.address = f"{'https' if encrypted else 'http'}://{shown}:{port}/?token={self.entrance.token}"
-        static = Path(os.environ.get("HFG_STUDIO_STATIC") or STATIC)
-        config = uvicorn.Config(
-            application(door, self.entrance, static),
-            ws="websockets-sansio",
-            ws_max_size=LONGEST,
-            ws_ping_interval=20.0,
-            ws_per_message_deflate=False,
-            log_config=None,
-            access_log=False,
-            lifespan="off",
-            server_header=False,
-            date_header=False,
-            timeout_graceful_shutdown=1,
-            ssl_certfile=certfile,
-            ssl_keyfile=keyfile,
-        )
-        self._server = uvicorn.Server(config)
+        app = application(door, self.entrance, Path(os.environ.get("HFG_STUDIO_STATIC") or STATIC))
+        self._server = uvicorn.Server(_config(app, certfile, keyfile))
         self._thread = threading.Thread(target=self._live, name="hfg studio server", daemon=True)
 
     def _live(self) -> None:
@@ -128,6 +113,24 @@ class Server:
         await asyncio.to_thread(self._thread.join, 3.0)
         self._socket.close()
         forget_secret(self._port)
+
+
+def _config(app: Any, certfile: str | None, keyfile: str | None) -> uvicorn.Config:
+    return uvicorn.Config(
+        app,
+        ws="websockets-sansio",
+        ws_max_size=LONGEST,
+        ws_ping_interval=20.0,
+        ws_per_message_deflate=False,
+        log_config=None,
+        access_log=False,
+        lifespan="off",
+        server_header=False,
+        date_header=False,
+        timeout_graceful_shutdown=1,
+        ssl_certfile=certfile,
+        ssl_keyfile=keyfile,
+    )
 
 
 def _listening(host: str, port: int | None) -> socket.socket:
