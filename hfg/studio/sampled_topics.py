@@ -1,4 +1,4 @@
-"""Topics of samples: measures of nodes, the flow of edges, the load of groups, the timeline. Depends on `run_topics`."""
+"""Topics of samples: measures of nodes, flow of edges, load of groups, the timeline. Depends on `run_topics`."""
 
 from __future__ import annotations
 
