@@ -1,6 +1,6 @@
-"""Whose code it is that asks: on the loop, in a task of an async node, in a thread, or inside a fused wave.
+"""Finds the node whose code is the caller: on the loop, in a task of an async node, in a thread, or in a fused wave.
 
-Nothing is noted for it while nodes fire but what other parts need anyway. Stands on `code` and `groups`.
+Nothing is recorded for this while nodes fire, except what other parts need anyway.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ __all__ = ["log_of_running_code", "speaker"]
 
 
 def log_of_running_code(core: Core) -> Logger:
-    """Give the log of the node whose code calls this; that of all nodes, if it is nobody's."""
+    """Return the log of the node whose code calls this; that of all nodes, if it is no node's code."""
     worker = speaker(core)
     if worker is None or worker.node is None:
         return Log("hfg.node")
@@ -25,7 +25,7 @@ def log_of_running_code(core: Core) -> Logger:
 
 
 def speaker(core: Core) -> RunningNode | None:
-    """Give the node of a run whose code calls this, if any."""
+    """Return the node of a run whose code calls this, if any."""
     worker = whose_code()
     if worker is not None:
         return worker

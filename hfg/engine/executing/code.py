@@ -23,35 +23,35 @@ from hfg.engine.model import ConcurrentFiring, Core, Job, RunningEvent, RunningN
 from hfg.engine.model.contracts import EagerTask as AnyEagerTask
 from hfg.engine.model.core import PENDING
 from hfg.engine.model.current import current_firing, current_task
+from hfg.engine.model.records import Done
 from hfg.engine.rules import concurrency, errors
 from hfg.engine.rules.sending import trigger, trigger_from_task
 
-__all__ = ["CodeRunner", "answer", "run_as", "whose_code"]
+__all__ = ["CodeRunner", "Pump", "answer", "run_as", "whose_code"]
 
 _code_of: contextvars.ContextVar[RunningNode | None] = contextvars.ContextVar("hfg.code_of", default=None)
 
-Done = Callable[[Any, BaseException | None], None]
 _Outcome = tuple[Any, Exception | None]
 
 
 def whose_code() -> RunningNode | None:
-    """Give the async node in whose code, or in a task it has firing, this is called."""
+    """Return the async node whose code, or a task of which, is the caller."""
     return _code_of.get()
 
 
 def run_as(worker: RunningNode) -> None:
-    """From here on, in this context, it is the code of this async node that runs."""
+    """From now on, in this context, the code of this async node runs."""
     _code_of.set(worker)
 
 
 def answer(waiter: asyncio.Future[Any], value: Any) -> None:
-    """Give a waiting future its result, unless whoever waited has gone."""
+    """Give a waiting future its result, unless the waiter is gone."""
     if not waiter.done():
         waiter.set_result(value)
 
 
 def _nobody_waits(_how_many: int) -> None:
-    """Who waits for room is no code of the node."""
+    """The code that waits for room is not the node's own."""
 
 
 def _limit_of(worker: RunningNode, firing: ConcurrentFiring | None) -> tuple[float | None, Callable[[], None]]:
@@ -62,40 +62,44 @@ def _limit_of(worker: RunningNode, firing: ConcurrentFiring | None) -> tuple[flo
     return worker.options.max_duration_s if limited else None, partial(errors.time_out, worker)
 
 
-class _Pump(Protocol):
-    """What is told that code has come back: the engine."""
+class Pump(Protocol):
+    """What needs to know that code is back: the engine."""
 
     beside_work: int
 
     def guard(self, call: Callable[[], None]) -> None:
-        """Call something of ours; what it raises ends the run."""
+        """Make a call of the engine's own; an error ends the run."""
 
     def go_on(self) -> None:
         """A callback of the loop is over: pump."""
 
     def give_way(self, call: Callable[[], None]) -> None:
-        """Call it behind all that is ready now."""
+        """Make this call after all that is ready now."""
+
+    def soon(self, callback: Callable[[], None]) -> None:
+        """Call back in the loop's next pass."""
+
+    def on_loop(self) -> bool:
+        """Return whether the caller is on the run's own thread."""
 
     def internal_fault(self, error: BaseException) -> None:
-        """A fault of ours ends the run."""
+        """End the run because of a fault in the engine."""
 
     def kick(self) -> None:
-        """Something may be queued."""
+        """Something may be queued: make the pump run."""
 
 
 class CodeRunner:
     """Runs the code of the nodes of one engine; see `core.Code`.
 
     Attributes:
-      given_up: eager_tasks of firings that took too long, until their code has ended.
+      given_up: eager tasks of firings that took too long, until their code has ended.
       aside: hooks of activity that wait.
-      came_back: set when code that was under way at the end of the run is over.
+      came_back: set when code that was in progress at the end of the run has ended.
       holds: work in threads for which virtual time stands still.
     """
 
-    def __init__(
-        self, engine: _Pump, core: Core, loop: asyncio.AbstractEventLoop, context: contextvars.Context
-    ) -> None:
+    def __init__(self, engine: Pump, core: Core, loop: asyncio.AbstractEventLoop, context: contextvars.Context) -> None:
         self._engine = engine
         self.core = core
         self.loop = loop
@@ -118,8 +122,8 @@ class CodeRunner:
             done(result, error)
 
     def _call(self, worker: RunningNode, call: Callable[..., Any], arguments: tuple[Any, ...]) -> _Outcome:
-        """Call what is a node's code, or begins with it; gives what that gave back, and what it raised."""
-        self.core.current = worker  # which stays so if what is raised is no error of the node
+        """Call a node's code, or the engine's code that starts it. Return its result and what it raised."""
+        self.core.current = worker  # which stays so if what is raised is not an `Exception`
         try:
             result = call(*arguments)
         except Exception as error:
@@ -305,7 +309,7 @@ class CodeRunner:
         return job
 
     def _hold(self, job: Job, limit_s: float | None, time_out: Callable[[], None]) -> None:
-        """R6: virtual time stands still until the job is back; it has so many real seconds (X2)."""
+        """Stop virtual time until the job is back (R6); its limit is in real seconds (X2)."""
         if not self.holds:
             self._engine.beside_work = 0
         self.holds += 1
@@ -315,7 +319,7 @@ class CodeRunner:
             held.limit(limit_s, partial(self.context.run, self._given_up, time_out))
 
     def hold_no_longer_than(self, seconds: float) -> None:
-        """X3: after so many real seconds virtual time goes on without the work that is in threads now."""
+        """After this many real seconds, virtual time continues without the work that is in threads now (X3)."""
         loop = self.loop
         if isinstance(loop, VirtualTimeLoop):
             for worker in self.core.workers:
@@ -329,7 +333,7 @@ class CodeRunner:
             self._came_in(job)
 
     def _came_in(self, job: Job) -> None:
-        """Time does not stand still for it any more, and the pump need not wait for it."""
+        """Time does not stop for it any more, and the pump need not wait for it."""
         job.keep_time(None)
         self.holds -= 1
         self._engine.beside_work = 0
@@ -432,12 +436,12 @@ class CodeRunner:
             await waiter
 
     async def _room(self, worker: RunningNode, own: Callable[[int], None]) -> None:
-        """Wait until there is room behind all events of a worker; `own` counts who of it waits."""
+        """Wait until all queues of a node's events have room; `own` counts how much of its code waits."""
         waiter: asyncio.Future[None] = self.loop.create_future()
         waits = True
 
         def over() -> None:
-            """From here on it is not quiet, though the code goes on only at the loop's next pass (F13)."""
+            """The graph is not quiet from now on, though the code continues only in the loop's next pass (F13)."""
             nonlocal waits
             if waits:
                 waits = False
@@ -455,15 +459,15 @@ class CodeRunner:
             self._look_for_room()
 
     def _look_for_room(self) -> None:
-        """An edit that waits for this code must not hold those who could make room."""
+        """An edit that waits for this code must not hold nodes that could make room."""
         if self.core.quiescing is not None:
             self.core.quiescing.look_for_room()
 
     # --- from threads -----------------------------------------------------------------------------------------------
 
     def deliver(self, box: deque[Any]) -> None:
-        """From a thread: one wake-up for all that it has put into its box by then."""
-        with contextlib.suppress(RuntimeError):  # the loop is closed: the run is over, nobody waits for this
+        """From a thread: wake the loop up once for all that is in the box by then."""
+        with contextlib.suppress(RuntimeError):  # the loop is closed: the run is over, and nothing waits for this
             self.loop.call_soon_threadsafe(self._collect, box, context=self.context)
 
     def _collect(self, box: deque[Any]) -> None:
@@ -480,10 +484,7 @@ class CodeRunner:
         self._engine.go_on()
 
     def _hold_back(self, box: deque[Any], item: Any) -> None:
-        """In virtual time what a thread brings comes in when the clock says so.
-
-        A job with the signals before it (R6).
-        """
+        """In virtual time the clock decides when a job arrives, with the signals before it (R6)."""
         if not isinstance(item, records.Job):
             self._early_signals.setdefault(id(box), []).append(item)
             return

@@ -1,9 +1,9 @@
-"""How an async node starts at once, and waits like a task if it suspends, for less.
+"""Starts the code of an async node at once, and lets it wait like a task, but for less.
 
-A coroutine stepped outside a task breaks `asyncio.timeout`, `anyio` and everything else that asks for the current
-task. So each async node has one dormant task, whose identity and context are entered around every step of its
-coroutines. The task itself sleeps on a future that hands cancellation on to the coroutine; what a coroutine waits
-for wakes the coroutine directly, as a task would, without a pass of the loop more.
+A coroutine that runs outside a task breaks `asyncio.timeout`, `anyio` and everything else that asks for the current
+task. A new task for each firing costs a pass of the loop. So each async node has one dormant task, whose identity and
+context are entered around every step of its coroutines. The task itself awaits a future that passes cancellation on to
+the coroutine. What a coroutine waits for wakes it directly, as it would a task, but without another pass of the loop.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from functools import partial
 from typing import Any
 
 from hfg.engine.model.core import PENDING
+from hfg.engine.model.records import Done
 
 __all__ = ["EagerTask"]
 
-Done = Callable[[Any, BaseException | None], None]
 
 if sys.version_info >= (3, 12):
     from asyncio.tasks import _swap_current_task as _swap  # type: ignore[attr-defined]
@@ -35,37 +35,23 @@ else:
 
 
 class _Sleep(asyncio.Future[None]):
-    """What a dormant task sleeps on; cancelling the task cancels what it lends its identity to."""
+    """What a dormant task awaits: cancelling the task cancels the coroutine that it lends its identity to."""
 
-    eager_task: EagerTask | None = None
+    def __init__(self, eager_task: EagerTask, loop: asyncio.AbstractEventLoop) -> None:
+        super().__init__(loop=loop)
+        self._eager_task = eager_task
 
     def cancel(self, msg: Any = None) -> bool:
-        """Hand the cancellation on; without a coroutine under way the task itself ends."""
-        if self.eager_task is not None and self.eager_task.take_cancellation(msg):
-            return True
-        return super().cancel(msg)
+        """Pass the cancellation on; without a coroutine in progress the task itself ends."""
+        return self._eager_task.take_cancellation(msg) or super().cancel(msg)
 
 
 class EagerTask:
     """The dormant task of one async node.
 
     Attributes:
-      task: what `asyncio.current_task()` gives inside the node's code.
-      waiting: whether a coroutine is under way.
+      task: the result of `asyncio.current_task()` inside the node's code.
     """
-
-    __slots__ = (
-        "_context",
-        "_coroutine",
-        "_done",
-        "_loop",
-        "_must_cancel",
-        "_outside",
-        "_soon",
-        "_waits",
-        "_waits_for",
-        "task",
-    )
 
     def __init__(
         self,
@@ -76,8 +62,8 @@ class EagerTask:
         soon: Callable[[Callable[[], None]], object] | None = None,
     ) -> None:
         self._loop = loop
-        self._soon = soon or partial(loop.call_soon, context=outside)  # goes on behind what is ready now
-        self._outside = outside  # in which the engine's own code goes on
+        self._soon = soon or partial(loop.call_soon, context=outside)  # continues after what is ready now
+        self._outside = outside  # the context of the engine's own code
         self._context = outside.copy() if context is None else context
         self._coroutine: Any = None
         self._done: Done | None = None
@@ -87,21 +73,19 @@ class EagerTask:
         self.task: asyncio.Task[None] = loop.create_task(self._sleep(), name=name, context=self._context)
 
     async def _sleep(self) -> None:
-        bed = _Sleep(loop=self._loop)
-        bed.eager_task = self
-        await bed
+        await _Sleep(self, self._loop)
 
     @property
     def waiting(self) -> bool:
-        """Whether a coroutine is under way."""
+        """Whether a coroutine is in progress."""
         return self._coroutine is not None
 
     def is_current(self) -> bool:
-        """Whether the code that asks is what it carries."""
+        """Return whether the caller is the code that it runs."""
         return asyncio.current_task(self._loop) is self.task
 
     def enter(self, call: Callable[..., object], *arguments: Any) -> None:
-        """Call something in the context of the code that it carries."""
+        """Call something in the context of the code that it runs."""
         self._context.run(call, *arguments)
 
     def start(self, coroutine: Any, done: Done, waits: Callable[[], None] | None = None) -> Any:
@@ -109,11 +93,11 @@ class EagerTask:
 
         Args:
           coroutine: what to run.
-          done: hears of its end if it has waited.
-          waits: called when the coroutine first waits for more than its turn; once.
+          done: receives its outcome if it has waited.
+          waits: called once, when the coroutine first waits for more than its turn.
 
         Returns:
-          What the coroutine returned, or `PENDING`: it waits, and `done(result, error)` follows on the loop.
+          The result of the coroutine, or `PENDING`: it waits, and `done(result, error)` follows on the loop.
 
         Raises:
           whatever the coroutine raised in its first step.
@@ -133,7 +117,7 @@ class EagerTask:
         return PENDING
 
     def cancel(self) -> None:
-        """Cancel the coroutine under way; without one, let the task end."""
+        """Cancel the coroutine in progress; without one, let the task end."""
         if not self.take_cancellation(None):
             self.task.cancel()
 
@@ -154,7 +138,7 @@ class EagerTask:
         self.task.cancel()
 
     def take_cancellation(self, message: Any) -> bool:
-        """Its task was cancelled: whether that is meant for a coroutine under way, which is cancelled then."""
+        """Its task was cancelled. Return whether that was passed on to a coroutine in progress."""
         if self.waiting:
             self._cancelled(message)
             return True
@@ -165,20 +149,20 @@ class EagerTask:
         return False
 
     def _cancelled(self, message: Any) -> None:
-        """As `asyncio.Task.cancel`: cancel what it waits for, else throw at the next step."""
+        """As `asyncio.Task.cancel`: cancel what it waits for, otherwise throw at the next step."""
         future = self._waits_for
         if future is None or not future.cancel(msg=message):
             self._must_cancel = asyncio.CancelledError() if message is None else asyncio.CancelledError(message)
 
     def _forget_cancellation(self) -> None:
-        """It was meant for a coroutine that has ended without ever waiting."""
+        """It was meant for a coroutine that has ended without waiting."""
         if not self.waiting:
             self._must_cancel = None
             while self.task.cancelling():
                 self.task.uncancel()
 
     def _wait(self, waits_for: Any) -> None:
-        """Go on when what the coroutine yielded is done; the protocol between coroutines, futures and tasks."""
+        """Continue when what the coroutine yielded is done: the protocol between coroutines, futures and tasks."""
         if waits_for is None:
             self._soon(self._step)
             return

@@ -1,8 +1,7 @@
 """Where nodes run: the loop group, other groups on the loop, and thread groups (rules R1, R2, X2).
 
-Who of a group is next is for its policy. The loop group is drained by the pump in `engine`, the others dispatch when
-the pump lets them. Threads are our own and daemons: an executor's stuck job would hold the interpreter's exit. Stands
-on `worker` and `policies`.
+A group's policy decides which node is next. The pump in `engine` drains the loop group; the others dispatch when it
+calls them. Threads are daemons of our own, because an executor would wait for a stuck job when the interpreter exits.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ class LoopGroup(Group):
 
 
 class _Turn:
-    """Stands for the worker whose turn on the loop is measured; only where time is shared: others pay nothing."""
+    """Takes the place of the node whose turn on the loop is measured; only if the policy shares time."""
 
     __slots__ = ("_clock", "_group", "_worker")
 
@@ -57,9 +56,9 @@ class _Turn:
 
 
 class CheckedTurn:
-    """Stands for the worker whose turn it is where the invariants are asked for after every step.
+    """Takes the place of the node whose turn it is, and checks invariants after every step.
 
-    In debug mode those of the worker itself; of all there is in the tests of the semantics.
+    In debug mode these are the node's own; in the tests of the semantics, all.
     """
 
     def __init__(self, group: Group, of_all: Callable[[], None] | None) -> None:
@@ -68,12 +67,12 @@ class CheckedTurn:
         self._turn: Any = None
 
     def take(self) -> CheckedTurn:
-        """Give out what is to be stepped next."""
+        """Return what is to be stepped next."""
         self._turn = self._take()
         return self
 
     def step(self, _: CheckedTurn) -> None:
-        """Step it, then ask."""
+        """Step it, then check."""
         turn = self._turn
         turn.step(turn)
         if self._of_all is not None:
@@ -83,7 +82,7 @@ class CheckedTurn:
 
 
 class SideGroup(LoopGroup):
-    """Nodes on the loop that are told apart from the loop group: they have a policy of their own."""
+    """Nodes on the loop with a policy of their own."""
 
     def __init__(
         self,
@@ -114,7 +113,7 @@ class SideGroup(LoopGroup):
             self._ready_groups.append(self)
 
     def dispatch(self) -> int:
-        """Let some nodes move, then others have their turn; give how many."""
+        """Let some nodes move. Return how many."""
         self._stands = False
         moved = 0
         try:
@@ -128,13 +127,13 @@ class SideGroup(LoopGroup):
 
 
 class ThreadGroup(Group):
-    """Threads of its own. The loop decides what they do next; results and signals of each come back in order.
+    """Nodes with threads of their own. The loop decides what the threads do next.
 
-    Many with one wake-up.
+    Results and signals of each thread come back in order, many with one wake-up.
 
     Attributes:
-      running: jobs given to threads and not yet back.
-      threads: how many it may have; they are made when they are needed.
+      running: jobs that threads have and that are not back.
+      threads: how many it may have; they are created on demand.
     """
 
     threaded = True
@@ -167,18 +166,18 @@ class ThreadGroup(Group):
         """See `Group`."""
         return self.running >= self.threads
 
-    def _push_next(self, worker: RunningNode) -> None:
-        self._into[1](worker)
-        if self.running < self.threads:
-            self._ready_groups.append(self)
-
     def _push(self, worker: RunningNode) -> None:
         self._into[0](worker)
         if self.running < self.threads:
             self._ready_groups.append(self)
 
+    def _push_next(self, worker: RunningNode) -> None:
+        self._into[1](worker)
+        if self.running < self.threads:
+            self._ready_groups.append(self)
+
     def dispatch(self) -> int:
-        """Let nodes start until the threads are busy; on the loop; give how many."""
+        """Let nodes start until the threads are busy. Return how many; on the loop."""
         policy, moved = self.policy, 0
         while moved < _DISPATCH_STEPS and not self.paused and self.running < self.threads and len(policy):
             moved += 1
@@ -196,14 +195,14 @@ class ThreadGroup(Group):
         lane.jobs.put(job)
 
     def _new_lane(self) -> _Lane:
-        """One thread more; the first has the name of the group."""
+        """Create a thread; the first has the name of the group."""
         name = self.name if not self._lanes else f"{self.name} {len(self._lanes) + 1}"
         lane = _Lane(name, self._deliver, self._context.copy())
         self._lanes.append(lane)
         return lane
 
     def returned(self, job: Job) -> None:
-        """A job came back; on the loop."""
+        """A job is back; on the loop."""
         self.running -= 1
         self._idle.append(job.lane)
         if self.charges is not None:
@@ -212,7 +211,7 @@ class ThreadGroup(Group):
             self._ready_groups.append(self)
 
     def signal(self, call: Callable[[], None]) -> None:
-        """From the group's own thread: do this on the loop, before the result of the job under way (F3)."""
+        """From the group's own thread: make this call on the loop, before the result of the current job (F3)."""
         lane = _Lane.current()
         if lane is None:
             raise UsageError(
@@ -221,11 +220,11 @@ class ThreadGroup(Group):
         lane.send(call)
 
     def thread_id(self) -> int:
-        """Of the thread that is at work, where it has only one; 0 if there is none yet."""
+        """Return the id of its only thread; 0 if there is none yet."""
         return self._lanes[0].thread.ident or 0 if self._lanes else 0
 
     def abandon(self, what: str, job: Job) -> None:
-        """X2: the job under way does not come back; the group goes on in a new thread."""
+        """The current job does not come back; the group continues in a new thread (X2)."""
         if self.charges is not None:
             self.charge(job.worker, self.clock() - job.began)
         lane = job.lane
@@ -238,7 +237,7 @@ class ThreadGroup(Group):
             self._ready_groups.append(self)
 
     def stop(self) -> list[threading.Thread]:
-        """Let the threads end after what they are doing."""
+        """Let the threads end after their current jobs. Return them."""
         lanes, self._lanes, self._idle = self._lanes, [], []
         for lane in lanes:
             lane.jobs.put(None)
@@ -246,11 +245,11 @@ class ThreadGroup(Group):
 
 
 Dispatching: TypeAlias = SideGroup | ThreadGroup
-"""Groups that let their nodes move when the pump comes to them."""
+"""Groups that let their nodes move when the pump calls them."""
 
 
 def current_job() -> Job | None:
-    """Give the job under way in the thread that calls this, if it is one of a group."""
+    """Return the current job of the calling thread, if it is one of a group."""
     lane = _Lane.current()
     return None if lane is None else lane.job
 
@@ -274,7 +273,7 @@ class _Lane:
         return getattr(cls._local, "lane", None)
 
     def send(self, item: Any) -> None:
-        """Hand something to the loop: one wake-up for all that is there when it looks."""
+        """Pass something to the loop, with one wake-up for all that is there by then."""
         if self.given_up:
             return
         first = not self._out
@@ -283,7 +282,7 @@ class _Lane:
             self._deliver(self._out)
 
     def give_up(self) -> None:
-        """What its thread still brings is too late; it ends by itself."""
+        """Ignore what its thread still sends; the thread ends by itself."""
         self.given_up = True
         self.jobs.put(None)
 

@@ -1,9 +1,8 @@
-"""Notices tasks that the code of nodes starts by asyncio itself, and that nobody looks after (rule X1).
+"""Finds tasks that the code of nodes creates by asyncio itself and then neglects (rule X1).
 
-A task that is awaited where it was started is nobody's affair: gathered, in a group, behind a time limit. One that
-still runs at the end of the run, or has failed with nobody there to hear of it, is told of as a warning that names the
-node and the remedy. While a run is on, the loop makes its tasks by a factory that notes whose code asks for one; that
-costs what makes tasks, and nothing else. Stands on `virtual`.
+A task that is awaited where it was created is fine: gathered, in a group, with a time limit. A task that still runs at
+the end of the run, or has failed without being awaited, is reported as a warning with the node and the remedy. During a
+run the loop creates its tasks by a factory that notes which node's code asks for one. Only that costs time.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ _of_loop: weakref.WeakKeyDictionary[asyncio.AbstractEventLoop, OrphanTasks] = we
 
 
 class OrphanTasks:
-    """Those of the runs on one event loop; `notice` when a run begins, `forget` when it is over."""
+    """Those of the runs on one event loop; `notice` when a run starts, `forget` when it is over."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
@@ -57,7 +56,7 @@ class OrphanTasks:
 
     @classmethod
     def notice(cls, loop: asyncio.AbstractEventLoop, asking: Asking) -> OrphanTasks:
-        """A run begins; `asking` tells the node of it whose code runs now, if any."""
+        """A run starts; `asking` returns its node whose code runs now, if any."""
         found = _of_loop.get(loop)
         if found is None:
             found = _of_loop[loop] = cls(loop)
@@ -65,7 +64,7 @@ class OrphanTasks:
         return found
 
     def forget(self, asking: Asking, is_of_run: Callable[[RunningNode], bool]) -> None:
-        """The run is over, and its code has ended: what that has left behind is told."""
+        """The run is over, and its code has ended: report what that has left behind."""
         for task, worker in list(self._tasks.items()):
             if not is_of_run(worker):
                 continue
@@ -97,7 +96,7 @@ class OrphanTasks:
         return task
 
     def _hear(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """What the loop says, also of a task that has failed and that nobody can look at any more."""
+        """Handle what the loop reports, including a failed task that is not referenced any more."""
         task: Any = context.get("task") or context.get("future")
         path = getattr(task, _PATH, None)
         error = context.get("exception")
@@ -110,7 +109,7 @@ class OrphanTasks:
 
 
 def _is_asked_for_by(worker: RunningNode, frame: FrameType | None) -> bool:
-    """Whether it is the node's own code that asks for a task, and not a library that looks after its tasks itself."""
+    """Return whether the node's own code creates the task, and not a library that handles its tasks itself."""
     while frame is not None:
         file = frame.f_code.co_filename
         if frame.f_code is _OF_THE_LOOP:

@@ -1,20 +1,19 @@
 """Runs the tasks that the code of nodes starts by `start_soon`: children of their nodes (rules X1, X3, R5).
 
-Each is carried as the code of an async node is, so that at the end of the run it can be left behind and outlives
-nothing. Stands on `eager_task` and `code`.
+Each runs as the code of an async node does, so it can be left behind at the end of the run, and nothing outlives that.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextvars
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 from hfg.base.clock import current_clock, current_elapsed
 from hfg.base.logs import current_log, node_log
-from hfg.engine.executing.code import CodeRunner, run_as
+from hfg.engine.executing.code import CodeRunner, Pump, run_as
 from hfg.engine.executing.eager_task import EagerTask
 from hfg.engine.model import Core, Doing, Task
 from hfg.engine.model.core import PENDING
@@ -29,33 +28,14 @@ __all__ = ["TaskRunner"]
 _OF_THE_RUN: tuple[contextvars.ContextVar[Any], ...] = (current_clock, current_elapsed, current_log)
 
 
-class _Pump(Protocol):
-    """What is told that a task has gone on: the engine."""
-
-    def guard(self, call: Callable[[], None]) -> None:
-        """Call something of ours; what it raises ends the run."""
-
-    def go_on(self) -> None:
-        """A callback of the loop is over: pump."""
-
-    def give_way(self, call: Callable[[], None]) -> None:
-        """Call it behind all that is ready now."""
-
-    def soon(self, callback: Callable[[], None]) -> None:
-        """Call back at the loop's next pass."""
-
-    def on_loop(self) -> bool:
-        """Whether the caller is on the run's own thread."""
-
-
 class TaskRunner:
     """Runs the tasks of the nodes of one engine.
 
     Attributes:
-      under_way: all of them, those too of nodes that an edit has taken out.
+      under_way: all of them, including those of nodes that an edit has removed.
     """
 
-    def __init__(self, engine: _Pump, core: Core, code: CodeRunner) -> None:
+    def __init__(self, engine: Pump, core: Core, code: CodeRunner) -> None:
         self._engine = engine
         self._core = core
         self._code = code
@@ -63,7 +43,7 @@ class TaskRunner:
         self._problems: list[NodeError] = []
 
     def start(self, worker: RunningNode, coroutine: Coroutine[Any, Any, Any], doing: Doing | None = None) -> None:
-        """Run a coroutine as a child of a node, from the loop's next pass on.
+        """Run a coroutine as a child task of a node, starting in the loop's next pass.
 
         Args:
           worker: of the node.
@@ -82,7 +62,7 @@ class TaskRunner:
         if doing is None:
             _not_again(worker)
         if worker.blocked & DISABLED and not worker.lifecycle.opening:
-            coroutine.close()  # a firing of a node that was switched off meanwhile: what it does goes nowhere (F10)
+            coroutine.close()  # the current firing of a node that was disabled meanwhile has no effects (F10)
             return
         task = Task(worker, name, coroutine, doing)
         worker.need_tasks().begin(task)
@@ -109,7 +89,7 @@ class TaskRunner:
         return None
 
     def _context(self, task: Task) -> contextvars.Context:
-        """What the code that has started it sees, but for whose code it is."""
+        """Return the context of the code that has started it, with the task as its own code."""
         context = contextvars.copy_context() if task.doing is None else self._code.context.copy()
         for one in _OF_THE_RUN:
             context.run(one.set, self._code.context[one])
@@ -119,7 +99,7 @@ class TaskRunner:
         return context
 
     def _begin(self, task: Task, context: contextvars.Context) -> None:
-        """Its turn has come; it may be over at its first step."""
+        """Start it; it may end in its first step."""
         code, core = self._code, self._core
         if task not in self.under_way:
             return  # it was left behind
@@ -164,7 +144,7 @@ class TaskRunner:
         self._end(task, None, None)
 
     def _over(self, task: Task, result: object, error: BaseException | None) -> None:
-        """It has come to its end."""
+        """It has ended."""
         self._core.current = None
         if task in self.under_way:
             self._engine.guard(partial(self._end, task, result, error))
@@ -192,7 +172,7 @@ class TaskRunner:
             do_activity.go_on(worker)
 
     def _failed(self, task: Task, error: BaseException) -> None:
-        """X1: the policy of its node decides; of one that was to end, it is told with other errors (X3)."""
+        """The policy of its node decides (X1); the error of a cancelled task is reported with other errors (X3)."""
         worker = task.worker
         what = task.what + (", after its end" if worker.blocked & ENDED else "")
         if self._core.over:
@@ -210,7 +190,7 @@ class TaskRunner:
             task.cancel()
 
     def leave_behind(self, seconds: float) -> list[NodeError]:
-        """Wait no more for what does not end; gives back what failed meanwhile, and what did not end."""
+        """Do not wait for tasks that do not end. Return what failed meanwhile, and what did not end."""
         problems, self._problems = self._problems, []
         for task in list(self.under_way):
             worker = task.worker
@@ -221,7 +201,7 @@ class TaskRunner:
 
 
 def _not_again(worker: RunningNode) -> None:
-    """X1: a firing that has started a task cannot be taken back, as one that has sent a signal cannot."""
+    """A firing that has started a task cannot be retried (X1), like one that has sent a signal."""
     if current_task.get() is not None:
         return
     firing = current_firing.get()

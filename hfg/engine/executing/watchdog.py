@@ -1,8 +1,7 @@
-"""Tells when a node blocks the loop: one warning with its path and the remedy.
+"""Warns when a node blocks the loop: once, with its path and the remedy.
 
-A thread of the process looks from time to time which worker's code is on which loop; if it is the same firing for
-longer than the run's limit, it says so, also when the code never returns. The hot path only notes whose code runs.
-Stands on `nodetypes`.
+One thread of the process checks periodically which node's code runs on which loop. It warns if that is the same firing
+for longer than the run's limit, even if the code never returns. The hot path only notes whose code runs.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ _LOGGER = Log("hfg.engine")
 
 
 class Watch:
-    """One run under watch."""
+    """One run that is watched."""
 
     def __init__(self, core: Core, limit_s: float, *, virtual: bool) -> None:
         self.core = core
@@ -37,7 +36,7 @@ class Watch:
         self.virtual = virtual
 
     def look(self, now: float) -> bool:
-        """Compare with the last look; any thread. Whether the loop is at work."""
+        """Compare with the last look. Return whether the loop is at work; from any thread."""
         self._end_slice()
         worker = self._at_work()
         if worker is None:
@@ -59,7 +58,7 @@ class Watch:
         return True
 
     def _end_slice(self) -> None:
-        """Nodes are slow, and the pump does not come to look at the clock: let it leave behind the call under way."""
+        """End the pump's slice after the current call if nodes are too slow for it to look at the clock."""
         core = self.core
         slice_ = core.slices if core.pumping else -1
         if slice_ == self.slice and slice_ >= 0 and not core.flags and not self.virtual:
@@ -67,7 +66,7 @@ class Watch:
         self.slice = slice_
 
     def _at_work(self) -> RunningNode | None:
-        """Whose code runs on the loop; in a fused region the line tells it."""
+        """Return the node whose code runs on the loop; in a fused region, by the current line."""
         worker = self.core.current or self.core.running_node
         region = worker.region if worker is not None else None
         if region is None or not region.running:
@@ -77,7 +76,7 @@ class Watch:
 
 
 def remedy_for(node: Node | None) -> str:
-    """Say what to do about a node that blocks the loop; what needs the loop cannot be put into a thread (R1)."""
+    """Return what to do about a node that blocks the loop; one that needs the loop cannot run in a thread (R1)."""
     why_loop = needs_loop(node) if node is not None else ""
     if not why_loop:
         return 'put it into a thread with graph.add(..., group="work") and graph.group("work", threads=1)'
@@ -97,7 +96,7 @@ class _Watchdog:
         self._thread: threading.Thread | None = None
 
     def watch(self, core: Core, limit_s: float, *, virtual: bool) -> Watch:
-        """Begin to watch a run; a limit of 0 or less watches nothing."""
+        """Start to watch a run; a limit of 0 or less warns of nothing."""
         watch = Watch(core, limit_s, virtual=virtual)
         with self._lock:
             self._watches.append(watch)

@@ -1,6 +1,6 @@
-"""In what order tokens wait for slot calls (rule F9), where one event edge leads into a node's slots and no other.
+"""The order in which tokens wait for slot calls (rule F9), if only one event edge leads into a node's slots.
 
-Then the order is that of its queue, and is kept there alone. Stands on the edges.
+Then it is the order of that edge's queue, and is kept only there.
 """
 
 from __future__ import annotations
@@ -16,10 +16,7 @@ __all__ = ["Calls", "CallsOfOne"]
 
 
 class CallsOfOne:
-    """Like a deque that holds the one edge as often as signals lie on it.
-
-    So what comes has come, and what goes is gone, by what happens to the edge.
-    """
+    """Like a deque that contains the edge once for each signal on it; changes of the edge change it."""
 
     __slots__ = ("_edge", "_queue")
 
@@ -40,11 +37,11 @@ class CallsOfOne:
         """The signal has been taken from the edge."""
 
     def index(self, _: Edge) -> int:
-        """Any of them is like the first."""
+        """All of them are alike."""
         return 0
 
     def append(self, _: Edge) -> None:
-        """The signal lies on the edge."""
+        """The signal is on the edge already."""
 
     def popleft(self) -> EventEdge:
         """The signal is taken from the edge at once."""

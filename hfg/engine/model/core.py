@@ -1,14 +1,15 @@
-"""The state of one run, shared by the modules that decide over it.
+"""The state of one run, which its decisions share.
 
-The rules decide over it and never wait: time, threads and coroutines are behind `Runtime` and `Code`, which are
-implemented where asyncio begins. It stands below the class of nodes, and so is generic in it.
+Decisions never wait: time, threads and coroutines are behind `Runtime` and `Code`, which asyncio implements in higher
+layers. This module is below the class of nodes, and so is generic in it.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections import deque
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
+from dataclasses import dataclass, field
 from types import FrameType
 from typing import Any, Final, Generic, Literal, Protocol
 
@@ -19,6 +20,7 @@ from hfg.engine.model.concurrent import ConcurrentFiring
 from hfg.engine.model.contracts import NodeT, Timer
 from hfg.engine.model.events import RunningEvent
 from hfg.engine.model.iteration import Iteration
+from hfg.engine.model.records import Done
 from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.tasks import Doing, Task
 from hfg.errors import HfgError
@@ -34,15 +36,18 @@ class _Pending:
         return "PENDING"
 
 
+PENDING = _Pending()
+"""The result of code that waits: the real one comes later."""
+
 _FOR_A_WAVE: Final = frozenset({"disturbed", "dissolved", "sends"})
-"""Flags that end the wave under way and nothing else."""
+"""Flags that only end the wave in progress."""
 
 
 class Flags(list[str]):
-    """Why who runs is to look round; the pump asks between two steps, a wave behind each of its calls.
+    """Why the pump, or a wave, must look at other things. The pump reads it between two steps.
 
-    A wave does not even ask: behind a call it looks whether the type of the result is that of the last one, which it
-    must do anyway, and whoever raises a flag lets it forget those types.
+    A wave does not even read it. After each call it checks whether the type of the result is the previous one, which it
+    must do anyway; and whoever raises a flag lets it forget those types.
 
     Attributes:
       forget: lets the wave that was entered last forget the types of its results; from any thread.
@@ -56,12 +61,12 @@ class Flags(list[str]):
 
     @override
     def append(self, why: str) -> None:
-        """Raise a flag; from any thread. First the flag, so that who finds types forgotten finds why."""
+        """Raise a flag; from any thread. The flag is first, so that a wave without types finds the reason."""
         super().append(why)
         self.forget()
 
     def lower_those_of_waves(self) -> bool:
-        """A wave has ended: whether a flag is up that is not for that wave alone."""
+        """A wave has ended. Return whether a flag is up that was not only for that wave."""
         self[:] = [flag for flag in self if flag not in _FOR_A_WAVE]
         return bool(self)
 
@@ -70,12 +75,8 @@ def _nothing() -> None:
     pass
 
 
-PENDING = _Pending()
-"""What an executor returns for code that waits: its result comes later."""
-
-
 class FusedRegion(Protocol[NodeT]):
-    """Nodes whose firings are fused (see the wing `fusion`), as those below know it."""
+    """Nodes whose firings are fused (see `fusion`), as lower layers see them."""
 
     head: NodeT
     running: bool
@@ -83,65 +84,62 @@ class FusedRegion(Protocol[NodeT]):
     paths: tuple[str, ...]  # of its members, in the order in which they fire
 
     def at_work(self, frame: FrameType | None) -> NodeT | None:
-        """Whose call a running wave is in, by the line it is at."""
+        """Return the member whose call a running wave is in, by the line at which it is."""
 
     def is_calling(self, worker: NodeT) -> bool:
-        """Whether the call of this member is the one under way in a running wave."""
-
-    def disturb(self, worker: NodeT) -> None:
-        """A member does not rest any more: the interpreted way goes on from here."""
+        """Return whether a running wave is in the call of this member."""
 
     def activity_changed(self, worker: NodeT) -> None:
         """A member is active now, or no longer."""
 
     def is_sending(self, worker: NodeT) -> bool:
-        """A member's code sends by itself: whether a fused call of it is under way."""
+        """A member's code sends: return whether a fused call of it is in progress."""
+
+    def disturb(self, worker: NodeT) -> None:
+        """A member does not rest any more: it continues unfused."""
 
     def interrupt(self) -> None:
-        """Let the wave under way end behind its present call."""
+        """End the wave in progress after its current call."""
 
     def abandon(self) -> NodeT:
-        """The wave under way does not come back: whose call it is in."""
+        """The wave in progress does not come back. Return the member whose call it is in."""
 
     def dissolve(self) -> None:
-        """Its members are nodes like any others from here on."""
+        """Its members are ordinary nodes from here on."""
 
     def measure_on(self) -> None:
-        """What was measured has been read: measure the next waves."""
-
-    def check_invariants(self) -> None:
-        """While it is armed everything inside rests."""
+        """Measurements have been read: measure the next waves."""
 
     def settle_counts(self) -> None:
-        """Let the members' counts say what the waves so far have done."""
+        """Add the waves so far to the members' counts."""
 
     def disarm(self) -> None:
-        """Let each member's barriers say what it waits for."""
+        """Let each member's barriers show what it waits for."""
+
+    def check_invariants(self) -> None:
+        """Check that everything inside rests while it is armed."""
 
 
 class Runtime(Protocol[NodeT]):
-    """What the deciding part of the engine needs from the waiting part."""
+    """What decisions need from the waiting part of the engine."""
 
     def now(self) -> float:
-        """Seconds on the run's clock."""
+        """Return seconds on the run's clock."""
 
     def call_at(self, when: float, callback: Callable[[], None], *, counts: bool = True) -> Timer:
-        """Call back at `when` on the run's clock.
-
-        If it counts it is one that could start something: quiet waits for it.
-        """
+        """Call back at `when` on the run's clock; `counts`: that could start something, so quiet waits for it."""
 
     def kick(self) -> None:
-        """Something was queued from outside the pump: see to it that it goes on."""
+        """Something was queued from outside the pump: make the pump run."""
 
     def finish(self, outcome: str, error: HfgError | None) -> None:
         """End the run; only the first call counts."""
 
     def soon(self, callback: Callable[[], None]) -> None:
-        """Call back at the loop's next pass."""
+        """Call back in the loop's next pass."""
 
     def start_task(self, worker: NodeT, coroutine: Coroutine[Any, Any, Any], doing: Doing[NodeT] | None = None) -> None:
-        """Start a task, a child of the node: its code has asked for it, or it is the node's do-activity (A15)."""
+        """Start a child task of the node, for its code or as its do-activity (A15)."""
 
     @property
     def teardown_limit_s(self) -> float:
@@ -151,66 +149,48 @@ class Runtime(Protocol[NodeT]):
         """A task was cancelled: if it does not end in time while the run continues, it is left behind (X3)."""
 
     def on_loop(self) -> bool:
-        """Whether the caller is on the run's own thread."""
+        """Return whether the caller is on the run's own thread."""
 
     def from_any_thread(self, call: Callable[[], None]) -> None:
-        """Do this on the loop; calls of one thread keep their order."""
+        """Make this call on the loop; calls of one thread keep their order."""
 
     def bring_in(self, call: Callable[[], None]) -> None:
-        """From a thread that is none of the run's: do this on the loop, in order, unless the run is over by then."""
+        """From a thread outside the run: make this call on the loop, in order, unless the run is over by then."""
 
     def adopt_event(self, port: EventPort[Any]) -> None:
         """Give an event the run's scheduler and thread."""
 
 
 class Code(Protocol[NodeT]):
-    """What runs the code of nodes where it belongs."""
+    """What runs the code of nodes where it belongs; `done(result, error)` follows, at once or later on the loop."""
 
-    def execute(
-        self,
-        worker: NodeT,
-        call: Callable[..., Any],
-        arguments: tuple[Any, ...],
-        done: Callable[[Any, BaseException | None], None],
+    def execute(self, worker: NodeT, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
+        """Run a node's code."""
+
+    def execute_concurrent(
+        self, firing: ConcurrentFiring[NodeT], call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
     ) -> None:
-        """Run a node's code where it belongs; `done(result, error)` follows, at once or later on the loop."""
+        """Run the code of one of several firings of a node (F14)."""
 
     def execute_wave(
-        self,
-        workers: Sequence[NodeT],
-        call: Callable[..., Any],
-        arguments: tuple[Any, ...],
-        done: Callable[[Any, BaseException | None], None],
+        self, workers: Sequence[NodeT], call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
     ) -> None:
         """Run code of several nodes of a thread group, one after the other; `done` follows even if the run is over."""
 
-    def execute_hook(
-        self, worker: NodeT, call: Callable[..., Any], done: Callable[[Any, BaseException | None], None]
-    ) -> None:
-        """Run a hook of activity beside whatever the worker is doing."""
+    def execute_hook(self, worker: NodeT, call: Callable[..., Any], done: Done) -> None:
+        """Run a hook of activity, concurrently with whatever the node does."""
 
     def drive(
         self,
         worker: NodeT,
         coroutine: Coroutine[Any, Any, object],
-        done: Callable[[Any, BaseException | None], None],
+        done: Done,
         firing: ConcurrentFiring[NodeT] | None = None,
     ) -> None:
         """Run a coroutine of the node's code, or of one of its firings (F14), to its end."""
 
-    def late(
-        self, worker: NodeT, done: Callable[[Any, BaseException | None], None]
-    ) -> Callable[[Any, BaseException | None], None]:
-        """What to call when code that waited is over."""
-
-    def execute_concurrent(
-        self,
-        firing: ConcurrentFiring[NodeT],
-        call: Callable[..., Any],
-        arguments: tuple[Any, ...],
-        done: Callable[[Any, BaseException | None], None],
-    ) -> None:
-        """Run the code of one of several firings of a node (F14); `done` follows, at once or later on the loop."""
+    def late(self, worker: NodeT, done: Done) -> Done:
+        """Return what to call when code that waited has ended."""
 
     def interrupt(self, worker: NodeT, *, firing: ConcurrentFiring[NodeT] | None = None) -> None:
         """Cancel or abandon code of the node that is in progress, or that of one of its firings (X2, F14)."""
@@ -218,42 +198,41 @@ class Code(Protocol[NodeT]):
     async def trigger_wait(
         self, event: RunningEvent[NodeT], value: object, activity: int | None, stamp: float | None
     ) -> None:
-        """Trigger an event, then wait until no `wait` queue behind the events of its node is full (F8)."""
+        """Trigger an event, then wait until no `wait` queue of the events of its node is full (F8)."""
 
 
 class RuleCallbacks(Protocol[NodeT]):
-    """What modules further up do when those below come to it, so that imports go down only."""
+    """What higher modules do when lower ones get there, so that imports go down only."""
 
     def idle_again(self, worker: NodeT) -> None:
-        """What kept a worker busy is over."""
+        """A node is no longer busy."""
 
     def fail(
-        self,
-        worker: NodeT,
-        what: str,
-        error: BaseException,
-        *,
-        answer: bool,
-        then: Callable[[], None] | None = None,
+        self, worker: NodeT, what: str, error: BaseException, *, answer: bool, then: Callable[[], None] | None = None
     ) -> None:
-        """X1: a firing (`answer`: it still owes its outputs) or something beside one has failed.
+        """Something of a node has failed (X1).
 
-        Where no answer is owed, `then` comes before the node is disabled or restarted.
+        Args:
+          worker: the node.
+          what: failed.
+          error: was raised.
+          answer: it is a firing, which still owes its outputs.
+          then: otherwise called before the node is disabled or restarted.
         """
 
     def fail_call(self, worker: NodeT, slot: str, error: BaseException) -> None:
-        """X1: a slot call has failed."""
+        """A slot call has failed (X1)."""
 
     def operator_failed(self, edge: EventEdge, error: BaseException) -> None:
-        """An operator on an edge raised."""
+        """An operator on an edge has raised."""
 
     def begin_concurrent(
         self, worker: NodeT, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
     ) -> None:
-        """F14: a firing that has taken its tokens goes on beside others; `refused`: it fails (P8)."""
+        """A firing that has taken its tokens continues alongside others (F14); `refused`: it fails (P8)."""
 
     def complete_firings(self, worker: NodeT) -> None:
-        """F14: the outputs are free: firings that are over may leave."""
+        """The outputs are free: firings that have ended may leave (F14)."""
 
     def send_end(self, worker: NodeT) -> None:
         """END is to follow, and the outputs are free (F4)."""
@@ -265,143 +244,146 @@ class RuleCallbacks(Protocol[NodeT]):
         """A(v) of a watched node has changed (A9, A11, A12, G2)."""
 
     def scopes_changed(self, core: Core[NodeT]) -> None:
-        """What subgraphs derive their activity from has changed (G2)."""
+        """The activity of subgraphs may have changed (G2)."""
 
     def deactivate_inside(self, scope: Scope[NodeT], cause: Literal["sent", "slot"]) -> None:
         """Activity leaves everything inside a subgraph (G2)."""
 
     def rewire(self, worker: NodeT) -> None:
-        """What a worker waits for has changed."""
+        """A node waits for other inputs than before."""
 
     def specialise(self, worker: NodeT) -> None:
-        """The wiring of a worker has changed: its shortest way may be another."""
+        """Wiring or observers of a node have changed: choose its shortest path again."""
 
     def bind_ports(self, worker: NodeT) -> None:
-        """A node is about to be set up: its ports lead into the run."""
+        """A node is about to be set up: connect its ports to the run."""
 
     def iterate(self, worker: NodeT, arguments: Sequence[Any]) -> None:
         """A subgraph that iterates fires (G4)."""
 
 
+@dataclass(slots=True, eq=False)
 class Core(Generic[NodeT]):
-    """One run.
+    """One run: what its decisions share."""
 
-    Attributes:
-      runtime: the waiting part of the engine.
-      code: what runs the nodes' code; given by the runtime.
-      trace: receives every event of the run, or None: nobody listens and nothing is built (R7).
-      trace_changes: receives what has to do with no single token or firing: changes of activity, parameters, structure;
-        also for those who want no more than that, and so keep nobody from the fast paths.
-      in_flight: firings, calls and hooks that wait or run in a thread.
-      tasks: that nodes have started beside these; a pause does not wait for them, quiet does.
-      timers: pending calls that could start something.
-      pumping: the loop group is being drained; what is queued now is reached without a kick.
-      current: the worker whose code runs on the loop, for the watchdog.
-    """
+    runtime: Runtime[NodeT]  # the waiting part of the engine
+    rules: RuleCallbacks[NodeT]
+    code: Code[NodeT] = field(init=False)  # runs the nodes' code
+    now: Callable[[], float] = field(init=False)
 
-    def __init__(self, runtime: Runtime[NodeT], rules: RuleCallbacks[NodeT]) -> None:
-        self.runtime = runtime
-        self.code: Code[NodeT]
-        self.rules = rules
-        self.now = runtime.now
-        self.trace: Callable[[TraceEvent], None] | None = None
-        self.trace_changes: Callable[[TraceEvent], None] | None = None
-        self.debug = False
-        self.sharing: Any = None  # in debug mode: who uses which values (T1)
-        self.fast = True
-        self.seed = 0  # of the run: what is drawn by chance is the same each time
-        self.fuse_after = 250  # firings of a head before its region is formed: forming costs as much as they save
-        self.started = False
-        self.over = False
-        self.recall: Callable[[NodeT], None] | None = None  # gives a node back the state that was kept of it
-        self.paused = False  # the run is paused: nodes move one by one
-        self.errors: list[HfgError] = []
-        self.overgrown: list[EventEdge] = []  # queues that F8 has enlarged so often that their ring is reported
-        self.lost_activity = 0
-        self._has_no_plan()
-        self._has_nothing_under_way()
+    # how it is done
+    debug: bool = False
+    sharing: Any = None  # in debug mode: who uses which values (T1)
+    fast: bool = True
+    seed: int = 0  # what is drawn by chance is the same each time
+    fuse_after: int = 250  # firings of a head before its region is formed: forming costs as much as they save
+    # Receives every event of the run (R7); None: nothing listens, so no event is built.
+    trace: Callable[[TraceEvent], None] | None = None
+    # Receives events that concern no single token or firing, such as changes of activity, parameters and structure. Who
+    # needs no others keeps no node from its fast paths.
+    trace_changes: Callable[[TraceEvent], None] | None = None
+    recall: Callable[[NodeT], None] | None = None  # restores the state that was kept of a node
+    started: bool = False
+    paused: bool = False  # nodes move one by one (R3)
+    over: bool = False
+
+    # what it consists of
+    workers: list[NodeT] = field(default_factory=list)
+    by_path: dict[str, NodeT] = field(default_factory=dict)
+    boundary: NodeT | None = None
+    edges: list[SyncEdge | BufferEdge | EventEdge] = field(default_factory=list)
+    scopes: list[Scope[NodeT]] = field(default_factory=list)
+    gates: list[Gate[NodeT]] = field(default_factory=list)
+    sources: list[NodeT] = field(default_factory=list)
+    feeds: list[NodeT] = field(default_factory=list)  # the graph's own inputs (P10)
+    readers: list[NodeT] = field(default_factory=list)  # the graph's own outputs
+    outlets: list[NodeT] = field(default_factory=list)  # edges leave here for another part of a graph that is cut (L1)
+    inlets: list[NodeT] = field(default_factory=list)  # edges arrive here from another part
+    piped: list[tuple[Any, tuple[Any, ...]]] = field(default_factory=list)  # edges with operators (P9)
+    outside: dict[tuple[int, str], Any] = field(default_factory=dict)  # edges for signals from outside the graph
+    observables: list[tuple[Any, Any, tuple[Any, ...]]] = field(default_factory=list)  # outside sources of edges
+    listeners: dict[Any, None] = field(default_factory=dict)  # outputs to slots, perhaps ahead of the edges' counts
+    regions: set[FusedRegion[NodeT]] = field(default_factory=set)  # perhaps ahead of the counts of their members
+    _numbers: Iterator[int] = field(default_factory=itertools.count)
+
+    # what is in progress
+    in_flight: int = 0  # firings, calls and hooks that wait or run in a thread
+    tasks: int = 0  # that nodes have started besides; quiet waits for them, a pause does not
+    timers: int = 0  # pending calls that could start something
+    iterating: list[Iteration[NodeT]] = field(default_factory=list)  # subgraphs with a firing, inner ones last (G4)
+    full_edges: int = 0  # queues that block their sources (F8)
+    suspects: dict[NodeT, None] = field(default_factory=dict)  # blocked so, and perhaps in a ring that has closed
+    all_suspect: bool = False
+    waiting_room: int = 0  # how much of `in_flight` and `tasks` awaits trigger_wait (F8)
+    dead_sources: set[NodeT] = field(default_factory=set)  # sources that feed only ended nodes (R5)
+    quiescing: Any = None  # what holds nodes for an edit (R4)
+    errors: list[HfgError] = field(default_factory=list)
+    lost_activity: int = 0
+    overgrown: list[EventEdge] = field(default_factory=list)  # queues that F8 enlarged so often that they are reported
+
+    # the pump
+    pumping: bool = False  # it runs: what is queued now is reached without a kick
+    slices: int = 0  # for the watchdog
+    until: float = 0.0  # its slice ends, on the run's clock
+    ready_groups: deque[Any] = field(default_factory=deque)  # other than the loop's own, with nodes that can move
+    flags: Flags = field(default_factory=Flags)  # why the pump, and waves on the loop, end after the current call
+    current: NodeT | None = None  # its code runs on the loop, for the watchdog
+    running_node: NodeT | None = None  # a fast path runs its code: what it triggers may take one too
+    ran_next: int = 0  # nodes that went next; in virtual time the pump counts waves, not hops
+
+    # the sending in progress, and what follows it
+    next_in_wave: list[NodeT] = field(default_factory=list)  # it has enabled them, and they go next (R2)
+    dirty_scopes: list[Scope[NodeT]] = field(default_factory=list)
+    deferred_events: list[NodeT] | None = None  # their automatic events follow the change in progress
+    returned: list[EventEdge] = field(default_factory=list)  # their +1 goes back to the sender (F13, A8)
+    to_notify: deque[tuple[Any, Token[Any]]] = field(default_factory=deque)  # signals for subscribers (F3)
+    notifying: bool = False  # subscribers are called
+    drained: list[tuple[NodeT, int]] = field(default_factory=list)  # modifiers that act after it (T4, F12)
+
+    def __post_init__(self) -> None:
+        self.now = self.runtime.now
+
+    def configure(
+        self, *, debug: bool, sharing: object, fast: bool, seed: int, fuse_after: int, code: Code[NodeT]
+    ) -> None:
+        """Set how the run is done, before it has nodes."""
+        self.debug, self.sharing, self.fast, self.seed = debug, sharing, fast, seed
+        self.fuse_after = fuse_after
+        self.code = code
 
     def recall_with(self, recall: Callable[[NodeT], None] | None) -> None:
-        """Let nodes get back, before they are set up, the state that was kept of them; None: no more."""
+        """Restore with this the state that was kept of nodes, before they are set up; None: no more."""
         self.recall = recall
 
-    def _has_no_plan(self) -> None:
-        self.workers: list[NodeT] = []
-        self._numbers = itertools.count()
-        self.edges: list[SyncEdge | BufferEdge | EventEdge] = []
-        self.scopes: list[Scope[NodeT]] = []
-        self.gates: list[Gate[NodeT]] = []
-        self.by_path: dict[str, NodeT] = {}
-        self.boundary: NodeT | None = None
-        self.sources: list[NodeT] = []
-        self.feeds: list[NodeT] = []  # the graph's own inputs (P10)
-        self.readers: list[NodeT] = []  # the graph's own outputs
-        self.outlets: list[NodeT] = []  # where edges leave for another part of a graph that is cut (L1)
-        self.inlets: list[NodeT] = []  # where they come in
-        self.piped: list[tuple[Any, tuple[Any, ...]]] = []  # edges with operators (P9)
-        self.outside: dict[tuple[int, str], Any] = {}  # edges by which signals come from outside the graph
-        self.observables: list[tuple[Any, Any, tuple[Any, ...]]] = []  # outside sources of edges
-        self.listeners: dict[Any, None] = {}  # outputs to slots, perhaps ahead of the edges' counts
-        self.regions: set[FusedRegion[NodeT]] = set()  # fused, and perhaps ahead of the counts of their members
-
-    def _has_nothing_under_way(self) -> None:
-        self.in_flight = 0
-        self.tasks = 0
-        self.iterating: list[Iteration[NodeT]] = []  # subgraphs amid such a firing, inner ones behind (G4)
-        self.full_edges = 0  # queues that hold their sources back (F8)
-        self.suspects: dict[NodeT, None] = {}  # held back so, and perhaps in a ring that has closed
-        self.all_suspect = False
-        self.waiting_room = 0  # of those, how much code awaits trigger_wait (F8)
-        self.timers = 0
-        self.pumping = False
-        self.slices = 0  # of the pump, for the watchdog
-        self.until = 0.0  # on the run's clock: the pump's slice is over
-        self.ready_groups: deque[Any] = deque()  # those beside the loop's own in which something can move
-        self.flags = Flags()  # of the pump and of the waves on the loop; not empty: these end behind the call under way
-        self.dead_sources: set[NodeT] = set()  # sources that feed only ended nodes (R5)
-        self.current: NodeT | None = None
-        self.running_node: NodeT | None = None  # whose code a fast path runs: what it triggers may take one too
-        self.quiescing: Any = None  # what holds nodes for an edit (R4)
-        self.next_in_wave: list[NodeT] = []  # enabled by the sending under way, and to go next (R2)
-        self.ran_next = 0  # how many have gone so; the pump counts waves, not hops, where time is virtual
-        self.dirty_scopes: list[Scope[NodeT]] = []
-        self.deferred_events: list[NodeT] | None = (
-            None  # those whose automatic events are told behind the change under way
-        )
-        self.returned: list[EventEdge] = []  # whose +1 of the sending under way goes back to the sender (F13, A8)
-        self.to_notify: deque[tuple[Any, Token[Any]]] = deque()  # signals of which subscribers are to hear (F3)
-        self.notifying = False  # they are hearing
-        self.drained: list[tuple[NodeT, int]] = []  # modifiers of the sending under way that act behind it (T4, F12)
-
     def ends_slice(self) -> bool:
-        """Whether a flag is up that is not for the wave alone that has ended by it: the pump is to look round."""
+        """Return whether the pump must look at other things: a flag is up that was not only for the wave it ended."""
         return self.flags.lower_those_of_waves()
 
     def settle_counts(self) -> None:
-        """Somebody is about to read how often nodes have fired: fused regions count by waves."""
+        """Bring the counts of nodes up to date before they are read: fused regions count by waves."""
         for region in self.regions:
             region.settle_counts()
         for listeners in self.listeners:
             listeners.settle_counts()
 
     def settle_barriers(self) -> None:
-        """Somebody is about to read what nodes wait for: in fused regions the head's barrier stands for all."""
+        """Bring barriers up to date before they are read: in fused regions the head's barrier represents all."""
         for region in self.regions:
             if not region.running:
                 region.disarm()
 
     def waits_changed(self) -> None:
-        """F8: who may wait for whom is not as it was, so any node that a full queue holds back may be in a ring now."""
+        """Other nodes may wait for each other now, so any node that a full queue blocks may be in a ring (F8)."""
         self.all_suspect = True
 
     def pause(self, paused: bool) -> None:
-        """R3: whether the run is paused, and nodes move one by one; a wave under way ends behind its present call."""
+        """Set whether the run is paused (R3). A wave in progress ends after its current call."""
         self.paused = paused
         for region in self.regions if paused else ():
             region.interrupt()
 
     def begin_async(self) -> None:
-        """Code waits, or runs in a thread: the run is not quiet before it has come back."""
+        """Code waits, or runs in a thread: the run is not quiet before it is back."""
         self.in_flight += 1
 
     def end_async(self) -> None:

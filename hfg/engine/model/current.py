@@ -1,6 +1,6 @@
-"""Whose code runs, where `asyncio` cannot tell: in which of several firings, or in which task of a node.
+"""Whose code runs, if `asyncio` does not know it: that of which firing, or of which task of a node.
 
-Context variables, so that they hold in whatever that code starts by itself. Stands on `running_node`.
+These are context variables, so they also hold in tasks that this code starts itself.
 """
 
 from __future__ import annotations

@@ -21,13 +21,13 @@ class Policy(Protocol[NodeT]):
     receives the time of each turn.
     """
 
-    def push(self, worker: NodeT) -> None:
+    def push(self, node: NodeT) -> None:
         """Add a node that can move."""
 
     def pop(self) -> NodeT:
         """Remove and return the next one."""
 
-    def remove(self, worker: NodeT) -> None:
+    def remove(self, node: NodeT) -> None:
         """Remove one that is queued."""
 
     def __iter__(self) -> Iterator[NodeT]:
@@ -88,7 +88,7 @@ class Group(Generic[NodeT]):
         """Whether all its threads are at work, so that none of its nodes can move."""
         return False
 
-    def charge(self, worker: NodeT, busy_s: float) -> None:
+    def charge(self, node: NodeT, busy_s: float) -> None:
         """A node has kept the group busy for this long."""
         if self.charges is not None:
-            self.charges(worker, busy_s)
+            self.charges(node, busy_s)

@@ -1,6 +1,6 @@
 """What holds of a whole run between two of its steps: of nodes, edges and regions, and between them.
 
-Asked in debug mode and by tests. Stands on `running_node` and `core`.
+Checked in debug mode and by tests.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ __all__ = ["check_invariants"]
 
 
 def check_invariants(core: Core[RunningNode]) -> None:
-    """Between two steps of the run certain things hold of all of it: nodes, edges, regions, and between them.
+    """Check what holds of a whole run between two of its steps.
 
     Raises:
       EngineInternalError: one of them does not.
     """
     if core.over:
         return
-    _check_workers(core)
+    _check_nodes(core)
     for region in core.regions:
         region.check_invariants()
     _check_queues(core)
@@ -34,8 +34,8 @@ def check_invariants(core: Core[RunningNode]) -> None:
             raise EngineInternalError(f'subgraph "{scope.path}": its activity is not that of its inside (G2)')
 
 
-def _check_workers(core: Core[RunningNode]) -> None:
-    """What lies on the edges is what the nodes at their ends have counted."""
+def _check_nodes(core: Core[RunningNode]) -> None:
+    """The nodes at the ends of edges have counted the tokens on them."""
     held: Counter[RunningNode] = Counter()
     full: Counter[RunningNode] = Counter()
     for edge in core.edges:
@@ -44,18 +44,18 @@ def _check_workers(core: Core[RunningNode]) -> None:
             full[edge.source] += edge.full
         else:
             held[edge.waits] += edge.unprocessed
-    for worker in core.workers:
-        worker.check_invariants()
-        worker.outputs.check_invariants(held[worker], f'outputs of "{worker.path}"')
-        if worker.room.full_edges != full[worker]:
-            raise EngineInternalError(f'node "{worker.path}": {full[worker]} of its queues are full (F8)')
-        if worker.region is not None and worker.region not in core.regions:
-            raise EngineInternalError(f'node "{worker.path}": its region is gone')
+    for node in core.workers:
+        node.check_invariants()
+        node.outputs.check_invariants(held[node], f'outputs of "{node.path}"')
+        if node.room.full_edges != full[node]:
+            raise EngineInternalError(f'node "{node.path}": {full[node]} of its queues are full (F8)')
+        if node.region is not None and node.region not in core.regions:
+            raise EngineInternalError(f'node "{node.path}": its region is gone')
 
 
 def _check_queues(core: Core[RunningNode]) -> None:
-    """Who is queued stands in the run queue of its group, once, and nobody else does."""
-    standing = Counter(worker for group in {worker.group for worker in core.workers} for worker in group.policy)
-    for worker in core.workers:
-        if standing[worker] != worker.queued:
-            raise EngineInternalError(f'node "{worker.path}": it stands {standing[worker]} times in its run queue')
+    """Queued nodes are in the ready queue of their group, once, and no others are."""
+    standing = Counter(node for group in {node.group for node in core.workers} for node in group.policy)
+    for node in core.workers:
+        if standing[node] != node.queued:
+            raise EngineInternalError(f'node "{node.path}": it is {standing[node]} times in its ready queue')

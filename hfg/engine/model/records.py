@@ -7,17 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, Final, Generic
+from typing import Any, Final, Generic, TypeAlias
 
 from hfg.engine.model.contracts import EagerTask, NodeT, Timer
 from hfg.errors import EngineInternalError
 
-__all__ = ["SAME_MOMENT_S", "Counts", "Ending", "Execution", "Job", "Lifecycle", "Rate", "Record", "Room"]
+__all__ = ["SAME_MOMENT_S", "Counts", "Done", "Ending", "Execution", "Job", "Lifecycle", "Rate", "Record", "Room"]
 
 SAME_MOMENT_S: Final = 1e-9
 """Times that differ by less are one moment: sums of floats differ by so little."""
 
-Done = Callable[[Any, BaseException | None], None]
+Done: TypeAlias = "Callable[[Any, BaseException | None], None]"
+"""Receives the result of a node's code, and what it raised."""
 
 
 class Record:

@@ -1,8 +1,8 @@
-"""Values that are shared are not changed (rule T1): debug mode locks arrays, and finds who changes what all the same.
+"""Values that are shared do not change (rule T1): debug mode locks arrays, and finds out what changes all the same.
 
-While a value lies on an edge, or a node that has taken it is at work, the arrays in it are read-only, and what else can
-be looked at cheaply is compared with what it was like when it was sent. Who is still at work is read from the edges and
-nodes themselves, so that whatever becomes of a token, nothing stays locked. Stands on `running_node`; decides nothing.
+While a value is on an edge, or the node that has taken it works, the arrays in it are read-only. Other values that can
+be inspected cheaply are compared with what they were when they were sent. Who still works is read from the edges and
+nodes themselves, so nothing stays locked, whatever happens to a token.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import weakref
 from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from itertools import chain, islice
 from types import FrameType
 from typing import Any, Final
@@ -44,23 +45,19 @@ _CANNOT_CHANGE: Final = frozenset({int, float, complex, bool, str, bytes, type(N
 
 
 class _Look:
-    """One walk through a value.
-
-    Attributes:
-      arrays: those that were met.
-    """
+    """One walk through a value."""
 
     def __init__(self) -> None:
-        self.arrays: list[Array] = []
+        self.arrays: list[Array] = []  # those that were found
         self._left = _MOST_PARTS
 
     def of(self, value: object) -> object:
-        """What the value is like, to be compared with what it is like later; of what cannot be looked into, which."""
+        """Return a snapshot of the value to compare later; for a value that cannot be inspected, its identity."""
         try:
             return self._at(value, DEPTH)
         except RuntimeError:  # a thread changes it at this moment
             return object()
-        except Exception:  # it lets nobody look into it
+        except Exception:  # it cannot be inspected
             return id(value)
 
     def _at(self, value: object, depth: int) -> object:
@@ -85,7 +82,7 @@ class _Look:
 
 
 def _parts(value: object) -> Collection[object] | None:
-    """What a container or a record holds, as something with a length; None: it cannot be looked into."""
+    """Return the parts of a container or record, as something with a length; None: it cannot be inspected."""
     kind: Any = type(value)
     if isinstance(value, dict):
         return [part for item in islice(list(value.items()), _MOST_PARTS) for part in item] + [len(value)]
@@ -108,7 +105,7 @@ def _sample(array: Array) -> object:
 
 
 def _whole(array: Array) -> list[Array]:
-    """The array and those that it is a view of, the one with the memory first."""
+    """Return the array and those that it is a view of, the owner of the memory first."""
     found = [array]
     while isinstance(found[-1].base, np.ndarray):
         found.append(found[-1].base)
@@ -117,7 +114,7 @@ def _whole(array: Array) -> list[Array]:
 
 
 def _can_be_unlocked(owner: Array) -> bool:
-    """Whether numpy would let us make it writeable again; memory that others lent it may not be."""
+    """Return whether numpy would let us make it writeable again; borrowed memory may not be."""
     if owner.base is None:
         return owner.flags.owndata
     try:
@@ -127,22 +124,15 @@ def _can_be_unlocked(owner: Array) -> bool:
         return False
 
 
+@dataclass(slots=True, eq=False)
 class _Lock:
-    """Keeps one piece of memory from being written to, as long as anybody holds it.
+    """Keeps one piece of memory read-only as long as anything holds it."""
 
-    Attributes:
-      arrays: those that were writeable, the owner of the memory first.
-      holders: how many hold it.
-    """
-
-    __slots__ = ("arrays", "holders")
-
-    def __init__(self) -> None:
-        self.arrays: dict[int, Array] = {}
-        self.holders = 0
+    arrays: dict[int, Array] = field(default_factory=dict)  # those that were writeable, the owner of the memory first
+    holders: int = 0
 
     def hold(self, arrays: Iterable[Array]) -> None:
-        """One more holds it."""
+        """Add a holder."""
         self.holders += 1
         for array in arrays:
             if array.flags.writeable:
@@ -150,63 +140,63 @@ class _Lock:
                 self.arrays[id(array)] = array
 
     def release(self) -> None:
-        """One fewer; the last gives back what was writeable, owners before their views, as numpy wants it."""
+        """Remove a holder. The last one makes arrays writeable again, owners before their views, as numpy requires."""
         self.holders -= 1
         if not self.holders:
             for array in self.arrays.values():
-                with suppress(ValueError):  # somebody has made its owner read-only meanwhile
+                with suppress(ValueError):  # something else has made its owner read-only meanwhile
                     array.flags.writeable = True
             self.arrays.clear()
 
 
+@dataclass(slots=True, eq=False)
 class _Lease:
-    """One token in use: on its edge, then by the firing or call that has taken it.
+    """One token in use: on its edge, then by the firing or call that has taken it."""
 
-    Attributes:
-      number: of the token on its edge.
-      looks: what the value was like when it was sent.
-      locks: by owner of memory.
-      ticket: of the firing or call that has taken it; `senders_ticket` that of its sender then.
-      firing: its number, by which several under way at once are told apart (F14); 0: a call.
-    """
+    edge: Edge
+    number: int  # of the token on its edge
+    value: object
+    looks: object  # a snapshot of the value when it was sent
+    locks: list[int] = field(default_factory=list)  # by owner of memory
+    ticket: int = 0  # of the firing or call that has taken it
+    firing: int = 0  # its number, because several may be in progress at once (F14); 0: a call
+    senders_ticket: int = 0  # the ticket of its sender at that time
 
-    __slots__ = ("edge", "firing", "locks", "looks", "number", "senders_ticket", "ticket", "value")
+    def take(self, node: RunningNode) -> None:
+        """The current firing or call of the node has taken it."""
+        self.ticket = node.ticket
+        self.firing = node.counts.firings if node.busy == "firing" else 0
+        self.senders_ticket = self.edge.source.ticket
 
-    def __init__(self, edge: Edge, number: int, value: object, looks: object) -> None:
-        self.edge = edge
-        self.number = number
-        self.value = value
-        self.looks = looks
-        self.locks: list[int] = []
-        self.ticket = 0
-        self.firing = 0
-        self.senders_ticket = 0
+    def is_changed(self) -> bool:
+        """Return whether the value differs from the last snapshot; each difference is reported once."""
+        before, self.looks = self.looks, _Look().of(self.value)
+        return bool(self.looks != before)
 
 
+@dataclass(slots=True, eq=False)
 class _Sent:
-    """Memory that was sent: by which array, what was in it, and how many referred to the array then.
+    """Memory that was sent."""
 
-    Attributes:
-      refs: by the calls on the way to where they were counted, each of which holds some of its own.
-    """
-
-    __slots__ = ("array", "looks", "refs")
-
-    def __init__(self, array: weakref.ref[Array], looks: object) -> None:
-        self.array = array
-        self.looks = looks
-        self.refs: dict[int, int] = {}
+    array: weakref.ref[Array]
+    looks: object  # a snapshot of its content
+    refs: dict[int, int] = field(default_factory=dict)  # references then, by call stack: each stack holds some itself
 
     def is_held_beside(self, array: Array, way: int, refs: int) -> bool:
-        """Whether somebody holds what was sent, beside the node that sends this array over the same memory now."""
+        """Return whether something holds it besides the node that sends this array over the same memory now."""
         known = self.array()
         if known is None:
             return False
         return known is not array or self.refs.get(way, refs) < refs
 
+    def sent_again(self, looks: object, way: int, refs: int) -> None:
+        """It is sent with this content, from this call stack."""
+        self.looks = looks
+        self.refs.setdefault(way, refs)
+
 
 class Sharing:
-    """Who uses which values of a run; on the loop alone."""
+    """Who uses which values of a run; only on the loop."""
 
     def __init__(self) -> None:
         self._lying: dict[Edge, deque[_Lease]] = {}
@@ -218,7 +208,7 @@ class Sharing:
     # --- the way of a value -----------------------------------------------------------------------------------------
 
     def rewritten(self, value: object) -> bool:
-        """Whether a node sends memory again, with another content, while somebody holds what it has sent before."""
+        """Return whether a node sends memory again, with other content, while something holds what it sent before."""
         if type(value) in _CANNOT_CHANGE:
             return False
         self.sweep()
@@ -242,16 +232,15 @@ class Sharing:
             held = before.is_held_beside(array, way, refs)
         if before is None or before.array() is not array:
             before = self._sent[where] = _Sent(weakref.ref(array, lambda _: self._sent.pop(where, None)), looks)
-        before.looks = looks
-        before.refs.setdefault(way, refs)
+        before.sent_again(looks, way, refs)
         return held
 
     def _count(self, array: Array) -> int:
-        """How many refer to it, but for its lock."""
+        """Return the number of references to it, without its lock."""
         return sys.getrefcount(array) - any(id(array) in lock.arrays for lock in self._locks.values())
 
     def sent(self, edge: Edge, token: Token[Any]) -> None:
-        """A token is put on an edge: from here on it is shared."""
+        """A token is put on an edge: from now on it is shared."""
         value = token.value
         if type(value) in _CANNOT_CHANGE:
             return
@@ -267,13 +256,13 @@ class Sharing:
         self._lying.setdefault(edge, deque()).append(lease)
 
     def _remember(self, edge: Edge, owner: Array) -> None:
-        """A thread may learn that it was locked when it is free again."""
+        """Remember what was locked: a thread may notice it only after the lock is gone."""
         if len(self._last_locked) > _MOST_REMEMBERED:
             self._last_locked.clear()
         self._last_locked[id(owner)] = weakref.ref(owner), edge
 
     def take(self, worker: RunningNode, edges: Sequence[Edge], tokens: Sequence[Token[Any]]) -> list[Edge]:
-        """A firing or call has taken these tokens; gives those edges on which the value was changed meanwhile."""
+        """A firing or call has taken these tokens. Return the edges on which a value was changed meanwhile."""
         changed = []
         for edge, token in zip(edges, tokens, strict=True):
             leases = self._lying.get(edge)
@@ -281,33 +270,25 @@ class Sharing:
                 self._end(leases.popleft())
             if leases and leases[0].number == token.sequence:
                 lease = leases.popleft()
-                lease.ticket = worker.ticket
-                lease.firing = worker.counts.firings if worker.busy == "firing" else 0
-                lease.senders_ticket = edge.source.ticket
+                lease.take(worker)
                 self._at_work.setdefault(worker, []).append(lease)
-                if self._is_changed(lease):
+                if lease.is_changed():
                     changed.append(edge)
         self.sweep()
         return changed
 
     def changed_by(self, worker: RunningNode) -> tuple[Edge, bool] | None:
-        """Its code is over: from where it has a value that is not what it was, if it has one.
+        """Its code has ended. Return the edge of a value that it took and that has changed, if there is one.
 
-        And whether the code of who has sent that ran meanwhile, too.
+        Also return whether the sender's code ran meanwhile.
         """
         for lease in self._at_work.get(worker, ()):
-            if self._is_changed(lease):
+            if lease.is_changed():
                 return lease.edge, lease.edge.source.ticket != lease.senders_ticket
         return None
 
-    def _is_changed(self, lease: _Lease) -> bool:
-        looks = _Look().of(lease.value)
-        changed = bool(looks != lease.looks)
-        lease.looks = looks  # told once
-        return changed
-
     def sweep(self) -> None:
-        """Let go of what is not in use any more."""
+        """Release what is not in use any more."""
         for edge, leases in list(self._lying.items()):
             oldest = _oldest(edge)
             while leases and (oldest is None or leases[0].number < oldest):
@@ -329,7 +310,7 @@ class Sharing:
                 del self._at_work[worker]
 
     def end(self) -> None:
-        """The run is over: let go of everything."""
+        """The run is over: release everything."""
         for lease in chain(*self._lying.values(), *self._at_work.values()):
             self._end(lease)
         self._lying.clear()
@@ -345,7 +326,7 @@ class Sharing:
     # --- who has tried ----------------------------------------------------------------------------------------------
 
     def explain(self, worker: RunningNode, error: BaseException) -> str | None:
-        """Say what a node's code has tried to write to, if it failed because we have made that read-only."""
+        """Describe what a node's code tried to write to, if it failed because this class made that read-only."""
         if not isinstance(error, Exception) or _READ_ONLY.search(in_words(error)) is None:
             return None
         for arrays in _arrays_in_frames(error):
@@ -370,13 +351,13 @@ class Sharing:
         return None
 
     def _is_ours(self, owner: Array) -> bool:
-        """Whether it is locked, or was lately."""
+        """Return whether it is locked, or was recently."""
         remembered = self._last_locked.get(id(owner))
         return remembered is not None and remembered[0]() is owner
 
 
 def _oldest(edge: Edge) -> int | None:
-    """The number of the oldest token on an edge; None: there is none."""
+    """Return the number of the oldest token on an edge; None: there is none."""
     if isinstance(edge, SyncEdge):
         return None if edge.token is None else edge.token.sequence
     queue: deque[Lying] = edge.queue  # type: ignore[attr-defined]
@@ -384,7 +365,7 @@ def _oldest(edge: Edge) -> int | None:
 
 
 def _way() -> int:
-    """By which calls we have come here."""
+    """Return a hash of the call stack."""
     frame: FrameType | None = inspect.currentframe()
     found = []
     while frame is not None:  # to its end: a firing may have begun inside the end of another, with what that has
@@ -394,7 +375,7 @@ def _way() -> int:
 
 
 def _arrays_in_frames(error: BaseException) -> Iterator[list[tuple[str, Array]]]:
-    """The arrays that the code in which something failed had at hand, by call, the innermost first, and their names."""
+    """Yield the names and arrays that the failed code could access, by stack frame, the innermost first."""
     frames = []
     place = error.__traceback__
     while place is not None:

@@ -1,7 +1,7 @@
-"""Who looks at what passes an edge (rule R7), and what a fused region may make of that.
+"""What observes the tokens on an edge (rule R7), and how a fused region serves it.
 
-A look is called with each token. Where nodes are fused there are no tokens, so those that need not see one at once are
-told of a whole wave together, which costs a fraction. Stands on the edges.
+A tap is called with each token. In a fused region there are no tokens, so a tap that does not need each one at once
+receives a whole wave, which costs a fraction.
 """
 
 from __future__ import annotations
@@ -19,49 +19,48 @@ TokenTap: TypeAlias = Callable[[Token[Any]], None]
 
 
 class BatchTap(partial[None]):
-    """A look that can be told of all that has passed in a wave at its end; else it is called with each token.
+    """A tap that can receive all that has passed in a wave at its end; otherwise it is called with each token.
 
     Attributes:
-      place: what it looks at, for its own use.
-      batch: called with five entries for each token, in the order in which they have passed: the place, the value
-        (None: NO_MESSAGE), the stamp, the number on its edge, and when it passed, on the clock of the run. What passes
-        so has activity 0.
+      place: what it observes, for its own use.
+      batch: called with five entries for each token, in order: the place, the value (None: NO_MESSAGE), the stamp, the
+        number on its edge, and when it passed, on the clock of the run. These tokens have activity 0.
     """
 
     place: object
     batch: Callable[[tuple[Any, ...]], None]
 
     @classmethod
-    def of(cls, look: TokenTap, place: object, batch: Callable[[tuple[Any, ...]], None]) -> BatchTap:
-        """Make one of what is called with each token."""
-        made = cls(look)
-        made.place, made.batch = place, batch
+    def of(cls, tap: TokenTap, place: object, batch: Callable[[tuple[Any, ...]], None]) -> BatchTap:
+        """Make one from what is called with each token."""
+        made = cls(tap)
+        made.__dict__.update(place=place, batch=batch)
         return made
 
 
 class FirstLiveTap(partial[None]):
-    """Fan-out carries the same token on each edge: this looks at the first that is live only."""
+    """Fan-out carries the same token on each edge: this observes only the first edge that is live."""
 
     @classmethod
-    def of(cls, edges: Sequence[AnyEdge], edge: AnyEdge, look: TokenTap) -> FirstLiveTap:
+    def of(cls, edges: Sequence[AnyEdge], edge: AnyEdge, tap: TokenTap) -> FirstLiveTap:
         """Make what is called with each token of one of the edges."""
-        return cls(_if_first, edges, edge, look)
+        return cls(_if_first, edges, edge, tap)
 
     def now(self) -> TokenTap | None:
-        """What it comes to as long as the same edges are live."""
-        edges, edge, look = self.args
-        return look if _is_first(edges, edge) else None
+        """Return what it amounts to as long as the same edges are live."""
+        edges, edge, tap = self.args
+        return tap if _is_first(edges, edge) else None
 
 
 def tap_inside(edge: AnyEdge) -> TokenTap | None:
-    """Who looks at an edge inside of a region, which lasts no longer than its edges are live."""
-    look: TokenTap | None = edge.tap
-    return look.now() if isinstance(look, FirstLiveTap) else look
+    """Return the tap of an edge inside of a region, which exists only while its edges are live."""
+    tap: TokenTap | None = edge.tap
+    return tap.now() if isinstance(tap, FirstLiveTap) else tap
 
 
-def _if_first(edges: Sequence[AnyEdge], edge: AnyEdge, look: TokenTap, token: Token[Any]) -> None:
+def _if_first(edges: Sequence[AnyEdge], edge: AnyEdge, tap: TokenTap, token: Token[Any]) -> None:
     if _is_first(edges, edge):
-        look(token)
+        tap(token)
 
 
 def _is_first(edges: Sequence[AnyEdge], edge: AnyEdge) -> bool:

@@ -51,8 +51,6 @@ _MOST_AT_ONE_INSTANT = 3_000_000  # firings, before a run with `until_s` is take
 
 _LOGGER = Log("hfg.engine")
 
-Done = Callable[[Any, BaseException | None], None]
-
 
 class _Timer:
     """A pending call that keeps the run from being quiet."""
@@ -118,13 +116,6 @@ class Engine:
         self.context.run(current_log.set, lambda: log_of_running_code(self.core))
         self.core: Core = Core(self, RuleFunctions())
         self.callbacks = Callbacks()
-        self.core.debug = settings.debug
-        if settings.debug:
-            self.core.sharing = Sharing()
-            self.callbacks.finished.append(self.core.sharing.end)
-        self.core.fast = settings.fast
-        self.core.seed = settings.seed or 0
-        self.core.fuse_after = settings.fuse_after
         self.graph: Graph = graph_of(flat.graph)
         self._slice_s = _SLICE_S
         self.holds = 0
@@ -143,7 +134,17 @@ class Engine:
         self._ready_groups: deque[Dispatching] = self.core.ready_groups
         self.scheduler = rx.RunScheduler(self)
         self.code = CodeRunner(self, self.core, self.loop, self.context)
-        self.core.code = self.code
+        sharing = Sharing() if settings.debug else None
+        if sharing is not None:
+            self.callbacks.finished.append(sharing.end)
+        self.core.configure(
+            debug=settings.debug,
+            sharing=sharing,
+            fast=settings.fast,
+            seed=settings.seed or 0,
+            fuse_after=settings.fuse_after,
+            code=self.code,
+        )
         self.tasks = TaskRunner(self, self.core, self.code)
         self.groups = self._make_groups()
         self._loop_group = self.groups["loop"]
