@@ -10,7 +10,7 @@ import os
 import pytest
 
 from tests.studio.page import live
-from tests.studio.test_replicas import walk
+from tests.studio.test_replicas import walk, walk_running
 
 SEQUENCES = int(os.environ.get("HFG_SOAK_SEQUENCES", "5000"))
 SEED = int(os.environ.get("HFG_SOAK_SEED", "1000000"))
@@ -23,3 +23,5 @@ def test_replicas_of_two_pages_are_the_graph(block: int) -> None:
     for seed in range(SEED + block * SEQUENCES // BLOCKS, SEED + (block + 1) * SEQUENCES // BLOCKS):
         print(f"seed {seed}")
         live(lambda seed=seed: walk(seed, steps=30))  # type: ignore[misc]
+        if seed % 10 == 0:
+            live(lambda seed=seed: walk_running(seed, steps=30))  # type: ignore[misc]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from typing import Any
 
 import msgspec
 import pytest
@@ -15,7 +16,7 @@ from tests.studio.page import Page, live, studio_of
 from tests.support.edits import drawn, random_edit
 from tests.support.making import Allowed, SeededChooser, random_plan
 
-__all__ = ["walk"]
+__all__ = ["walk", "walk_running"]
 
 
 @pytest.mark.slow
@@ -24,6 +25,48 @@ __all__ = ["walk"]
 def test_replicas_of_two_pages_are_the_graph_after_any_edits_cuts_and_restarts(block: int) -> None:
     for seed in range(block * 20, block * 20 + 20):
         live(lambda seed=seed: walk(seed, steps=12))  # type: ignore[misc]
+
+
+@pytest.mark.slow
+@pytest.mark.rule("R4")
+@pytest.mark.parametrize("block", range(4))
+def test_replicas_follow_a_graph_that_is_started_and_stopped_in_between(block: int) -> None:
+    for seed in range(block * 5, block * 5 + 5):
+        live(lambda seed=seed: walk_running(seed, steps=12))  # type: ignore[misc]
+
+
+async def walk_running(seed: int, *, steps: int) -> None:
+    """What a run refuses is not done to the plain graph either; what it acknowledges is."""
+    plan, choose = random_plan(seed, Allowed()), SeededChooser(seed)
+    graph, oracle = plan.build(), plan.build()
+    studio = studio_of(graph)
+    pages = [Page(studio).join(), Page(studio).join()]
+    for number in range(steps):
+        page = pages[choose.number(0, 1)]
+        if choose.chance(20):
+            answer = await page.ask("start", stay=True) if studio.steering.run is None else await page.ask("stop")
+            if answer["t"] == "ack" and page.run["state"] == "stopping":
+                await page.state("ended")
+            continue
+        verb = choose.one_of(("edit", "edit", "undo", "redo"))
+        commands = random_edit(graph, choose, number) if verb == "edit" else []
+        plain = msgspec.json.decode(c.encode(commands))
+        answer = await (page.edit(*plain) if verb == "edit" else page.ask(verb))
+        if answer["t"] == "ack":
+            oracle.edit(*commands) if verb == "edit" else getattr(oracle, verb)()
+    await studio.steering.close()
+    pages[0].studio.refresh_all()
+    assert pages[0].agrees()
+    assert pages[0].tables == pages[1].tables
+    assert _without_values(drawn(graph, identity=False)) == _without_values(drawn(oracle, identity=False))
+    await studio.close()
+
+
+def _without_values(state: Any) -> Any:
+    """Tokens of the run have set parameters, too."""
+    if isinstance(state, dict):
+        return {name: _without_values(one) for name, one in state.items() if name != "parameters"}
+    return state
 
 
 async def walk(seed: int, *, steps: int) -> None:
