@@ -85,7 +85,7 @@ class Project:
             kind="none" if file is None else "yaml" if file.name.endswith(SUFFIX) else "python",
             changes=self.changes,
             can_save=file is not None and file.name.endswith(SUFFIX),
-            elsewhere=self._elsewhere,
+            elsewhere=self.elsewhere,
             journal=None if offer is None else JournalOffer(*offer),
         )
 
@@ -101,6 +101,11 @@ class Project:
             return len(history.undone) - history.undone.index(self._saved)
         return len(history.done) + 1
 
+    @property
+    def elsewhere(self) -> str:
+        """Why saving does not simply overwrite the file; "" if it does."""
+        return f"{self._elsewhere} Yours has {_count(self.changes)}." if self._elsewhere else ""
+
     def look(self) -> None:
         """See whether another program has written the file. It is read only if its time or size has changed."""
         stat = self._stat()
@@ -109,7 +114,7 @@ class Project:
         self._seen, elsewhere = stat, ""
         if self.file is not None and self._fingerprint() != self._print:
             what = "was removed" if stat is None else "was changed on disk by another program"
-            elsewhere = f"{self.file.name} {what}. Yours has {_count(self.changes)}."
+            elsewhere = f"{self.file.name} {what}."
         self._elsewhere = elsewhere
 
     def _stat(self) -> tuple[int, int] | None:
@@ -191,7 +196,7 @@ class Project:
         self._seen = None
         self.look()
         if not force and file == self.file and self._elsewhere:
-            raise Refused("changed", self._elsewhere)
+            raise Refused("changed", self.elsewhere)
         if not force and file != self.file and file.exists():
             raise Refused("changed", f"{file.name} is there already; overwrite it, or choose another name")
         save(self.graph, file)
