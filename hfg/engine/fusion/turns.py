@@ -76,6 +76,10 @@ class Turns(WaveState):
             one = queue.popleft()
             if one is until and not (one.calls and one.calls_before):
                 break
+            if type(one) is _Turnstile:  # of a wave in which this one is a turn, and which goes first
+                queue.appendleft(one)
+                goes_on = False
+                break
             one.step(one)
             goes_on = not ((flags and core.ends_slice()) or self.called_off)
         outputs.count(outputs.missing - 1)
