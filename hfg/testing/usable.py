@@ -100,6 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--limit", type=float, default=60.0, help="seconds of CPU time for one type (60)")
     given = parser.parse_args(arguments)
     if given.worker:
+        try_type("hfg.testing.nodes:double")  # the first trial of a process takes a second, a later one 30 ms
         serve(_How, _tried)
         return 0
     references, problems = references_of(given.what)
