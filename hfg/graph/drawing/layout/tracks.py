@@ -21,7 +21,7 @@ _NEAR: Final = 8.0  # two lines next to each other can be distinguished from her
 _OVERLAP: Final = 40  # as bad as N crossings
 
 
-class Trunk(msgspec.Struct):
+class _Trunk(msgspec.Struct):
     """What a net has in one channel.
 
     Attributes:
@@ -54,17 +54,17 @@ class Way(msgspec.Struct):
 
 def tracks_of(ways: Sequence[Way], grid: Grid, axis: str, *, fixed: bool) -> dict[int, int]:
     """Return each way its place in all channels of one axis; also say how many tracks each channel has."""
-    by_channel: dict[int, dict[int, Trunk]] = {}
+    by_channel: dict[int, dict[int, _Trunk]] = {}
     for way in ways:
         for number, (along, strip) in enumerate(way.legs):
             if along == axis:
-                trunk = by_channel.setdefault(strip, {}).setdefault(way.net, Trunk())
+                trunk = by_channel.setdefault(strip, {}).setdefault(way.net, _Trunk())
                 _meet(trunk, way, number, (grid.x if axis == "x" else grid.y).middle(strip))
     counts = {}
     strips = grid.x if axis == "x" else grid.y
     places: dict[tuple[int, int], float] = {}
     for strip, trunks in by_channel.items():
-        counts[strip] = tracks(list(trunks.values()))
+        counts[strip] = _tracks(list(trunks.values()))
         room = strips.width(strip)
         pitch = PITCH if not fixed else min(PITCH, room / (counts[strip] + 1))
         first = strips.middle(strip) - pitch * (counts[strip] - 1) / 2
@@ -77,7 +77,7 @@ def tracks_of(ways: Sequence[Way], grid: Grid, axis: str, *, fixed: bool) -> dic
     return counts
 
 
-def _meet(trunk: Trunk, way: Way, number: int, middle: float) -> None:
+def _meet(trunk: _Trunk, way: Way, number: int, middle: float) -> None:
     """Note where a way comes into a channel and where it leaves it, and on which side."""
     axis = way.legs[number][0]
     for step, end in ((-1, way.tail), (1, way.head)):
@@ -94,7 +94,7 @@ def needed(count: int, least: float, pad: float) -> float:
     return max(least, PITCH * (count - 1) + 2 * pad) if count else least
 
 
-def tracks(trunks: Sequence[Trunk]) -> int:
+def _tracks(trunks: Sequence[_Trunk]) -> int:
     """Return each trunk its track, and say how many there are."""
     upright = sorted(trunks, key=lambda one: one.span)
     count = len(upright)
@@ -135,7 +135,7 @@ def tracks(trunks: Sequence[Trunk]) -> int:
     return most
 
 
-def _cost(left: Trunk, right: Trunk) -> int:
+def _cost(left: _Trunk, right: _Trunk) -> int:
     """What it costs to have the one left of the other: crossings, and lines that would lie on each other."""
     low, high = right.span
     cost = sum(low <= at <= high for at in left.high)
