@@ -217,7 +217,7 @@ class Distribution:
         calls = self._asking.open(name)
         shares = self._launcher.shares_memory
         engine = self._part.engine
-        clock = RunClock(machine(), engine.ahead_s, engine.began_at)
+        clock = RunClock(machine(), engine.time.ahead_s, engine.time.began_at)
         ledger = self._ledgers.get(name)
         kept = None if ledger is None or ledger.entry is None else ledger.entry.data
         lives_of_all, known = dict(self._incarnations), _known_packages()

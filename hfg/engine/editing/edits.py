@@ -166,7 +166,7 @@ class Edits:
         """
         engine = self._engine
         edit = _Following(changes)
-        engine.hold()
+        engine.quiet.hold()
         try:
             self._find_out(edit, check=check)
             swapped = [worker for worker, _, _ in edit.how.swapped]
@@ -198,7 +198,7 @@ class Edits:
                 await self._hooks.to_its_end(self._hooks.tear_down(edit.come))
             raise
         finally:
-            engine.unhold()
+            engine.quiet.unhold()
         return edit.how.gone
 
     def _find_out(self, edit: _Following, *, check: bool) -> None:

@@ -118,11 +118,9 @@ class Quiesced:
     async def _or_end(self, waiter: asyncio.Future[None]) -> None:
         """Wait until all are idle, or the run is over."""
         engine = self._engine
-        ending = asyncio.ensure_future(engine.ending.wait())
         try:
-            await asyncio.wait((waiter, ending), return_when=asyncio.FIRST_COMPLETED)
+            await engine.or_end(waiter)
         finally:
-            ending.cancel()
             if self._counts:
                 self._counts = False
                 engine.core.end_async()

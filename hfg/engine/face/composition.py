@@ -123,13 +123,13 @@ class Composition:
     def stay_open(self) -> None:
         """Let the run not end by itself."""
         self._held = True
-        self.engine.hold()
+        self.engine.quiet.hold()
 
     def let_end(self) -> None:
         """Let the run end by itself (R5)."""
         if self._held:
             self._held = False
-            self.engine.unhold()
+            self.engine.quiet.unhold()
 
     async def close(self) -> None:
         """Tear the run down, once; whoever comes later waits for that.

@@ -47,7 +47,7 @@ class Feed(Generic[T]):
         _check_running(self._engine)
         self._check_not_ended()
         self._open = True
-        self._engine.hold()
+        self._engine.quiet.hold()
         return self
 
     async def __aexit__(
@@ -59,7 +59,7 @@ class Feed(Generic[T]):
                 async with self._lock:
                     self._put_end()
         finally:
-            self._engine.unhold()
+            self._engine.quiet.unhold()
 
     async def send(
         self, value: T | Token[T] | Marker | None, *, activity: int | None = None, stamp: float | None = None
@@ -155,14 +155,14 @@ class _Waiting:
     def __init__(self, engine: Engine, feed: RunningNode) -> None:
         self._engine = engine
         self._feed = feed
-        engine.senders.append(feed)
+        engine.quiet.senders.append(feed)
         self._is_over = False
 
     def over(self) -> None:
         """It was sent, or never will be."""
         if not self._is_over:
             self._is_over = True
-            self._engine.senders.remove(self._feed)
+            self._engine.quiet.senders.remove(self._feed)
             self._engine.kick()
 
 
@@ -178,14 +178,11 @@ async def until(engine: Engine, when: Callable[[Callable[[], None]], None]) -> N
     """Wait for a barrier, or for the end of the run."""
     waiter: asyncio.Future[None] = engine.loop.create_future()
     when(partial(answer, waiter, None))
-    if waiter.done():
-        return
-    ending = asyncio.ensure_future(engine.ending.wait())
-    try:
-        await asyncio.wait((waiter, ending), return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        ending.cancel()
-        waiter.cancel()
+    if not waiter.done():
+        try:
+            await engine.or_end(waiter)
+        finally:
+            waiter.cancel()
 
 
 def _check_running(engine: Engine) -> None:
@@ -197,23 +194,23 @@ async def read(engine: Engine, worker: RunningNode) -> AsyncIterator[Any]:
     """Give out the values of a graph output, with back-pressure, until END or the end of the run (P10)."""
     if not worker.live_inputs:
         raise UsageError(f'graph output "{worker.port_name}" is not connected: nothing will come out of it')
-    engine.readers.append(worker)
+    engine.quiet.readers.append(worker)
     try:
         while True:
             while worker.inputs.missing:  # another reader may have been faster
-                if engine.core.over or worker in engine.read_out:
+                if engine.core.over or worker in engine.quiet.read_out:
                     return
                 await until(engine, worker.inputs.when_complete)
             token = take_from_reader(worker)
             engine.kick()
             if token.value is END:
-                engine.read_out.add(worker)
+                engine.quiet.read_out.add(worker)
                 return
-            engine.read_out.discard(worker)
+            engine.quiet.read_out.discard(worker)
             if token.value is not NO_MESSAGE:
                 yield token.value
     finally:
-        engine.readers.remove(worker)
+        engine.quiet.readers.remove(worker)
         engine.kick()
 
 

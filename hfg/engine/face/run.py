@@ -491,20 +491,18 @@ class Run:
         waiter: asyncio.Future[Token[Any]] = self._engine.loop.create_future()
         bind_event(self._engine.worker_of(event.node), event.name)
         subscription = event.subscribe(partial(answer, waiter))
-        ending = asyncio.ensure_future(self._engine.ending.wait())
         try:
-            await asyncio.wait((waiter, ending), return_when=asyncio.FIRST_COMPLETED)
+            await self._engine.or_end(waiter)
             if waiter.done():
                 return waiter.result()
             raise NotRunning(f'the run ended before "{event.path}" was triggered')
         finally:
-            ending.cancel()
             waiter.cancel()
             subscription.dispose()
 
     async def wait_quiet(self) -> None:
         """Wait until nothing runs, nothing can start and no timer is pending that could start something (R5)."""
-        await self._engine.wait_quiet()
+        await self._engine.quiet.wait()
         self._parts.raise_failure()
 
     async def wait_inputs(self, node: Node | str) -> None:

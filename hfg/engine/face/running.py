@@ -181,7 +181,7 @@ async def _run_to_end(
                         answer.close()
                         _need_begin(answer)
                 if settings.allow_idle:
-                    engine.hold()
+                    engine.quiet.hold()
                 await parts.start()
                 await engine.ending.wait()
             finally:

@@ -143,7 +143,7 @@ async def watched(run: Run, watch: bool | str) -> AsyncIterator[None]:
       run: what they see.
       watch: whether they may, or what they are told the program is called.
     """
-    if watch is False:
+    if not watch:
         yield
         return
     async with AsyncExitStack() as stack:

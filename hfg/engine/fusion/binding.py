@@ -106,7 +106,7 @@ class _Names:
         self.core = core
         self.head = region.head
         self.now = core.now
-        self.epoch = host.epoch
+        self.epoch = host.time.epoch
         self.flags = region.flags
         self.queue = region.head.group.policy
         self.ready = core.ready_groups  # asked for by a wave at each of its ends

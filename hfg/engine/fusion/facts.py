@@ -31,7 +31,7 @@ class Facts:
         self.turns = region.takes_turns
         self.is_async = any(worker.is_async for worker in self.order)
         host: Any = region.core.runtime
-        self.real = host.epoch is not None  # time goes on while code runs
+        self.real = host.time.epoch is not None  # time goes on while code runs
         self.loops = self.real and not self.head.paced and (self.is_source or self._one_queue())
         self.called = region.schedule.called
         self.senders = region.activity_senders

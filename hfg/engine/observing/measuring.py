@@ -201,7 +201,7 @@ class Measuring:
     def spans(self) -> tuple[float, float, float]:
         """Return seconds since measuring began on the run's clock and on the machine's, and those that rates are of."""
         engine = self._engine
-        now = engine.now() if engine.ended_at is None else engine.ended_at
+        now = engine.now() if engine.time.ended_at is None else engine.time.ended_at
         return (
             now - self._began,
             (self._ended_on_machine or monotonic()) - self._began_on_machine,

@@ -315,8 +315,8 @@ class Recorder(Listener):
         """Make what is called with each token; `answers`: each is a firing's, so silence stands in for one refused."""
         extend, items, sizes = self._items.extend, self._items, self._thread.sizes
         now = self._engine.now
-        real = self._engine.epoch is not None
-        epoch = self._engine.epoch or 0.0
+        real = self._engine.time.epoch is not None
+        epoch = self._engine.time.epoch or 0.0
         keep = place.keep
 
         def put(token: Token[Any]) -> None:

@@ -1,9 +1,9 @@
-"""Where tokens leave a part of a graph and come into it, in a graph that is cut for processes (rules L1, P4, P5, F5).
+"""Where tokens leave a part of a graph and arrive in it, if the graph is cut for processes (rules L1, P4, P5, F5).
 
-An `Outlet` stands for the far end of an edge that leads away. What may not be lost lies on that edge until it was taken
-over there: so the edge's own rules hold its producer back, and nothing else has to. An `Inlet` stands for the near end.
-It lays what comes on its edge as there is room, and says what was taken and what is done. Both are plain decisions;
-whoever owns the part moves the tokens. Stands on `engine` and `rules`.
+An `Outlet` represents the far end of an edge that leaves the part. Lossless tokens stay on that edge until the other
+part has taken them, so the edge's own rules block its producer, and nothing else has to. An `Inlet` represents the near
+end. It puts what arrives on its edge as there is room, and reports what was taken and what is done. Both only decide;
+the owner of the part moves the tokens.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from hfg.ports.edges import EventEdge, SyncEdge
 __all__ = ["Hearing", "Inlet", "Outlet"]
 
 Hearing: TypeAlias = Literal["open", "over", "deaf"]
-"""What the consumer of an edge does with tokens: takes them; drains them, having ended (F12); is sent none (F10)."""
+"""What the consumer of an edge does with tokens: takes them; drains them, as it has ended (F12); gets none (F10)."""
 
 
 class Outlet:
@@ -35,35 +35,35 @@ class Outlet:
 
     Attributes:
       label: of the edge.
-      sent: how many tokens have left, as its two ends count them: through all lives of both.
+      sent: how many tokens have left, as both ends count them: over all incarnations of both.
       taken: how many of them count as taken by the consumer.
-      left: how many have left in this life.
+      left: how many have left in this incarnation.
       end_has_left: END was the last of them.
-      hearing: what that does with them, as far as is known here.
+      hearing: what the consumer does with them, as far as is known here.
     """
 
     def __init__(
         self, engine: Engine, worker: RunningNode, *, keeps: bool, wake: Callable[[], None], drains: bool = True
     ) -> None:
-        """Stand there.
+        """Take the place of the consumer.
 
         Args:
           engine: of the part.
           worker: the reader at the end of the edge.
-          keeps: tokens lie here until they were taken over there; else they are gone when they have left.
-          wake: called, amid the pump, when something lies here that has not left.
-          drains: what is for a consumer that has ended is drained here; else over there, where it may be known when all
-            is done that came of what it took before.
+          keeps: tokens stay here until the consumer has taken them; otherwise they are gone when they have left.
+          wake: called during the pump when a token is here that has not left.
+          drains: tokens for an ended consumer are drained here; otherwise over there, where it may be known when all
+            that follows from earlier tokens is done.
         """
         self._engine = engine
         self._worker = worker
         self._keeps = keeps
         if not keeps:
-            engine.look_round_often()  # nobody holds its producer back: of all that it sends in a slice one would leave
+            engine.look_round_often()  # its producer is not blocked, and would replace tokens before they leave
         self._drains = drains
         (self._edge,) = worker.in_edges
-        self._waiting = 0  # tokens that have left and still lie here
-        self._owed = 0  # tokens that a former life has kept and that are not taken: the oldest of those under way
+        self._waiting = 0  # tokens that have left and are still here
+        self._owed = 0  # tokens kept by a former incarnation and not taken: the oldest of those in transit
         self.end_has_left = False
         self.hearing: Hearing = "open"
         self.label: str = worker.port_name
@@ -78,7 +78,7 @@ class Outlet:
         worker.run_by(step)
 
     def leave(self, most: int) -> list[Token[Any]]:
-        """Give the tokens that have come since the last time, oldest first, at most so many; they are on their way."""
+        """Return the tokens that have arrived since the last time, at most `most`, oldest first; they leave now."""
         worker, edge = self._worker, self._edge
         if not self._keeps:
             tokens: list[Token[Any]] = []
@@ -98,7 +98,7 @@ class Outlet:
         return tokens
 
     def last_word(self) -> Token[Any] | None:
-        """Give END once more if it was sent and is lost, where signals may be: it may not (F13)."""
+        """Return END again if it was sent and lost: on a lossy edge signals may be lost, but not END (F13)."""
         edge = self._edge
         if self._keeps or type(edge) is not EventEdge or not edge.end_sent:
             return None
@@ -109,50 +109,50 @@ class Outlet:
 
     @property
     def finished(self) -> int:
-        """How many of those that have left in this life count as taken."""
+        """How many of those that have left in this incarnation count as taken."""
         return self.left - self._waiting
 
     def rebase(self, total: int) -> None:
-        """A former life has sent so many, and nobody waits for what becomes of them."""
+        """A former incarnation has sent this many, and nothing waits for them."""
         self.sent += total
         self.taken += total
 
     def stand_at(self, number: int) -> None:
-        """That is the number of the last one that has left: a new life of the consumer counts from there."""
+        """This is the number of the last token that has left: a new incarnation of the consumer counts from there."""
         self.taken += number - self.sent
         self.sent = number
 
     def owe(self, count: int) -> None:
-        """A former life has kept so many for the consumer, which are on their way and do not lie here."""
+        """A former incarnation has kept this many for the consumer; they are in transit, not here."""
         self.sent += count
         self._owed += count
 
     @property
     def unsent(self) -> list[Token[Any]]:
-        """What lies here and has not left, oldest first."""
+        """The tokens here that have not left, oldest first."""
         lies: list[Token[Any]] = self._edge.contents()
         return lies[self._waiting :]
 
     def repeat(self, count: int) -> None:
-        """Of what has left, so many had been sent by a former life: they count once."""
+        """This many of those that have left were sent by a former incarnation: they count once."""
         self.sent -= count
         self.taken -= count
 
     @property
     def speaking(self) -> bool:
-        """Whether the producer is enabled: what waits for one that is not waits for nobody (F10)."""
+        """Whether the producer is enabled; a disabled one is not waited for (F10)."""
         return not self._edge.source.blocked & DISABLED
 
     @property
     def has_more(self) -> bool:
-        """Whether something lies here that has not left."""
+        """Whether a token is here that has not left."""
         return bool(self._edge.untaken > self._waiting)
 
     @property
     def holds_up(self) -> bool:
-        """Whether somebody is to wait for what becomes of tokens here.
+        """Whether the outcome of tokens here is waited for.
 
-        Not where nobody hears them; nor where one end of the edge has ended, once all is taken that came before.
+        It is not if the consumer gets none, or if one end has ended and all earlier tokens are taken.
         """
         if self.hearing == "deaf":
             return False
@@ -160,11 +160,11 @@ class Outlet:
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing will come here any more."""
+        """Whether no token will arrive here any more."""
         return bool(self._edge.source.blocked & ENDED) and not self._edge.untaken
 
     def be_taken(self, total: int) -> None:
-        """So many in all were taken by the consumer: their places are free (F5, F8)."""
+        """The consumer has taken this many in total: their places are free (F5, F8)."""
         count = total - self.taken
         if count <= 0:
             return
@@ -179,7 +179,7 @@ class Outlet:
         self._engine.kick()
 
     def hear(self, hearing: Hearing) -> None:
-        """The consumer hears otherwise from now on: what lies here for it is treated as it would be there."""
+        """The consumer does something else with tokens from now on: treat those here as it would."""
         before, self.hearing = self.hearing, hearing
         worker = self._worker
         if before == "deaf":
@@ -206,18 +206,18 @@ class Inlet:
 
     Attributes:
       label: of the edge.
-      received: how many tokens have come, as its two ends count them: through all lives of both.
+      received: how many tokens have arrived, as both ends count them: over all incarnations of both.
       taken: how many of them their consumer has taken.
-      heard: how many the producer has sent, as far as is known here, by its numbers.
+      heard: how many the producer has sent, by its numbers, as far as is known here.
       speaking: whether their producer is enabled, as far as is known here.
     """
 
     def __init__(self, engine: Engine, worker: RunningNode, moved: Callable[[Inlet], None]) -> None:
-        """Stand there.
+        """Take the place of the producer.
 
         Args:
           engine: of the part.
-          worker: stands for the source of the edge.
+          worker: represents the source of the edge.
           moved: called when `taken` has grown.
         """
         self._engine = engine
@@ -233,8 +233,8 @@ class Inlet:
         self.received = 0
         self.heard = 0
         self.taken = 0
-        self._done = 0  # of those, in the part, with all that came of them
-        self._orphans = 0  # of so many the producer has died and left nobody who waits for them to be done
+        self._done = 0  # of those, in the part, with all that followed from them
+        self._orphans = 0  # the producer of so many has died, so nothing waits for them to be done
 
         def step(worker: RunningNode) -> None:
             worker.dequeued()
@@ -245,65 +245,65 @@ class Inlet:
 
     @property
     def waiting(self) -> int:
-        """How many have come that no firing and no call has taken."""
+        """How many have arrived and were not taken."""
         return len(self._inbox) + int(self._edge.untaken)
 
     def rebase(self, total: int) -> None:
-        """A former life has done so many."""
+        """A former incarnation has done this many."""
         self.received += total
         self.taken += total
         self._done += total
 
     def rebase_to(self, number: int) -> None:
-        """All up to that number was done by former lives, or is lost with them."""
+        """All up to this number was done by former incarnations, or is lost with them."""
         self.received = self.taken = self._done = number
 
     @property
     def settled(self) -> int:
-        """For how many nobody waits any more: they are done, or who has sent them is dead."""
+        """How many are not waited for any more: they are done, or their producer is dead."""
         return max(self._done, self._orphans)
 
     def settle(self, done: int) -> bool:
-        """So many are done in the part, with all that came of them; give whether more than before."""
+        """This many are done in the part, with all that followed. Return whether that is more than before."""
         if done <= self._done:
             return False
         self._done = done
         return True
 
     def orphan(self) -> None:
-        """The producer has died and left nobody who waits for what has come."""
+        """The producer has died, so nothing waits for what has arrived."""
         self._orphans = self.received
 
     def hold(self, held: bool) -> None:
-        """Lay no more tokens on an edge of data until it is let go: what has come waits here."""
+        """Put no more tokens on an edge of data, or do again; those that have arrived wait here."""
         self._held = held
 
     @property
     def is_clear(self) -> bool:
-        """Whether nothing that was laid is still in the part, nor what came of it."""
+        """Whether nothing that was put on the edge, nor what followed from it, is still in the part."""
         return not self._worker.outputs.missing and self.settled >= self.taken
 
     def skip(self, count: int) -> None:
-        """So many have come that are not for this life: what belongs to them was done by a former one."""
+        """This many have arrived that a former incarnation has handled."""
         self.received += count
         self._edge.count_dropped(count)
 
     def lose(self, count: int) -> None:
-        """So many have left and will never come: the edge may lose some, and counts them."""
+        """This many have left and will never arrive: a lossy edge counts them."""
         self.received += count
         self._edge.count_dropped(count)
 
     def count_lost(self, count: int) -> None:
-        """So many are lost with the process of a part."""
+        """This many are lost with the process of a part."""
         self._edge.lost += count
 
     def arrive(self, tokens: Sequence[tuple[Any, int, float]]) -> None:
-        """Tokens have come over the link: value, modifier and stamp of each."""
+        """Tokens have arrived over the link: value, modifier and stamp of each."""
         self.received += len(tokens)
         self._inbox.extend(tokens)
 
     def speak(self, speaking: bool) -> None:
-        """The producer was disabled or enabled; what came before counts for signals alone (F10)."""
+        """The producer was disabled or enabled; earlier tokens stay only if they are signals (F10)."""
         self.speaking = speaking
         if speaking:
             enable_around(self._worker)
@@ -314,15 +314,15 @@ class Inlet:
         self._engine.kick()
 
     def lay(self) -> None:
-        """Lay what has come on the edge, as far as there is room; say what was taken since the last time.
+        """Put what has arrived on the edge, as far as there is room; report what was taken since the last time.
 
-        What comes before this part has begun waits here: `start` is on its edges first (A10), wherever data comes from.
+        Tokens that arrive before this part starts wait here: `start` is on its edges first (A10).
         """
         core = self._engine.core
         if core.over or not core.started:
             return
         if not reaches(self._edge):
-            while self._inbox:  # what lies where it comes from goes back from there (A8)
+            while self._inbox:  # the other part takes back what is still on its side (A8)
                 self._inbox.popleft()
                 self._edge.count_dropped()
         if type(self._edge) is EventEdge:
@@ -353,7 +353,7 @@ class Inlet:
             outputs.when_complete(self._free)
 
     def _free(self) -> None:
-        """Amid a step of the engine: what follows is laid when that is over, in turn with what else can move."""
+        """During a step of the engine: continue after it, when it is this node's turn."""
         self._waits = False
         if self._worker.group.threaded:
             self._engine.soon(self.lay)
@@ -367,7 +367,7 @@ class Inlet:
 
     @property
     def hearing(self) -> Hearing:
-        """What its consumer does with tokens; those that carry activity are for it even if it has ended (F12)."""
+        """What its consumer does with tokens; even an ended one gets those that carry activity (F12)."""
         if not reaches(self._edge):
             return "deaf"
         over = self._joins and not self._edge.active and self._edge.target.blocked & ENDED

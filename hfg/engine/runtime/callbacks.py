@@ -1,12 +1,13 @@
-"""What an engine tells those who stand on it: the only way from here up (rules R3, R4, R7).
+"""What an engine notifies higher layers of: its only way up (rules R3, R4, R7).
 
-They put in what they want to be called; the engine knows none of them, and without them a run is the same. What the
-deciding modules ask of those above them, and need an answer to, is another table: `core.RuleCallbacks`.
+They add what they want to be called. The engine knows none of them, and without them a run is the same.
+`core.RuleCallbacks` has what decisions request of modules above them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import dataclass, field
 
 import msgspec
 
@@ -21,9 +22,9 @@ class Edited(msgspec.Struct, frozen=True):
     """What an edit has changed.
 
     Attributes:
-      workers: have another node.
-      swapped: nodes that were replaced, and by what.
-      nodes: at which something is not as it was, also those that are gone.
+      workers: those with another node.
+      swapped: nodes that were replaced, with their replacements.
+      nodes: those at which something has changed, including removed ones.
     """
 
     workers: Sequence[RunningNode]
@@ -31,24 +32,14 @@ class Edited(msgspec.Struct, frozen=True):
     nodes: Set[object]
 
 
+@dataclass(slots=True)
 class Callbacks:
-    """What is called, in the order in which it was put in.
+    """What to call, in the order in which it was added."""
 
-    Attributes:
-      begun: the nodes are set up, `start` is on its edges and the sources may fire, but nothing has moved yet (A10).
-      pumped: a slice of the pump is over.
-      rested: the pump would go on now, but the run is paused.
-      finished: the run is over; nothing is torn down yet.
-      edited: an edit has taken effect (R4).
-      joined: an edge by which signals come from outside was made.
-    """
-
-    __slots__ = ("begun", "edited", "finished", "joined", "pumped", "rested")
-
-    def __init__(self) -> None:
-        self.begun: list[Callable[[], None]] = []
-        self.pumped: list[Callable[[], None]] = []
-        self.rested: list[Callable[[], None]] = []
-        self.finished: list[Callable[[], None]] = []
-        self.edited: list[Callable[[Edited], None]] = []
-        self.joined: list[Callable[[EventEdge], None]] = []
+    # The nodes are set up, `start` is on its edges and the sources may fire, but nothing has moved yet (A10).
+    begun: list[Callable[[], None]] = field(default_factory=list)
+    pumped: list[Callable[[], None]] = field(default_factory=list)  # a slice of the pump is over
+    rested: list[Callable[[], None]] = field(default_factory=list)  # the pump would run, but the run is paused
+    finished: list[Callable[[], None]] = field(default_factory=list)  # the run is over; nothing is torn down yet
+    edited: list[Callable[[Edited], None]] = field(default_factory=list)  # an edit has taken effect (R4)
+    joined: list[Callable[[EventEdge], None]] = field(default_factory=list)  # an edge for outside signals was made

@@ -1,7 +1,6 @@
-"""Where somebody looks at a run: at a node, a port or an edge, and how that is found again when the graph was edited.
+"""Places in a run that are observed: a node, a port or an edge; and how to find them again after an edit.
 
-A node and its ports are the same whatever they are called; an edge is known by the ports at its ends. Stands on
-`relays`.
+A node and its ports stay the same whatever they are called; an edge is identified by the ports at its ends.
 """
 
 from __future__ import annotations
@@ -35,10 +34,10 @@ class Ends(msgspec.Struct, frozen=True):
 
 
 def place_of(engine: Engine, what: Any) -> Any:
-    """Give what is meant by a node, a port, an edge or a path of one of them.
+    """Return the node, port or edge that is meant, by itself or by its path.
 
     Raises:
-      GraphError: the path leads nowhere.
+      GraphError: the path does not exist.
     """
     if isinstance(what, DrawnEdge):
         wholes = [edge for edge in _edges(engine) if what in edge.segments]
@@ -57,7 +56,7 @@ def place_of(engine: Engine, what: Any) -> Any:
 
 
 def edges_at(engine: Engine, place: Any) -> list[Any]:
-    """The edges of the run that a place is about; those between nodes."""
+    """Return the edges of the run, between nodes, at a place."""
     if isinstance(place, Ends):
         return [
             edge for edge in _edges(engine) if edge.source_port is place.source and edge.target_port is place.target
@@ -70,14 +69,14 @@ def _edges(engine: Engine) -> Iterator[Any]:
 
 
 def is_near(place: Any, nodes: Set[Any]) -> bool:
-    """Whether a place is at one of some nodes and subgraphs."""
+    """Return whether a place is at one of some nodes and subgraphs."""
     if isinstance(place, Ends | DrawnEdge):
         return is_near(place.source, nodes) or is_near(place.target, nodes)
     return place in nodes or getattr(place, "node", None) in nodes
 
 
 def behind(place: Any, swapped: Mapping[Any, Any]) -> Any:
-    """The same place when some nodes were replaced by others."""
+    """Return the same place after some nodes were replaced by others."""
     if isinstance(place, Ends):
         return Ends(behind(place.source, swapped), behind(place.target, swapped))
     if isinstance(place, Node):
@@ -90,7 +89,7 @@ def behind(place: Any, swapped: Mapping[Any, Any]) -> Any:
 
 
 def is_gone(place: Any) -> bool:
-    """Whether the node of a place was removed from the graph, alone or with a subgraph around it."""
+    """Return whether the node of a place was removed from the graph, by itself or with a subgraph around it."""
     if isinstance(place, Ends):
         return is_gone(place.source) or is_gone(place.target)
     node: Any = place.node if isinstance(place, Port) else place

@@ -1,7 +1,4 @@
-"""From a flattened graph to running nodes and edges (rule G1): everything a token needs is found here, once.
-
-Stands on `graph.flat`, `running_node` and `wiring`.
-"""
+"""From a flattened graph to running nodes and edges (rule G1): everything that a token needs is found here, once."""
 
 from __future__ import annotations
 
@@ -38,9 +35,9 @@ _OF_ACTIVITY = ("activated", "deactivated", "timeout")  # the events that tell i
 
 
 def build(core: Core, flat: FlatGraph, groups: Mapping[str, Group], *, loop: Group) -> None:
-    """Make the workers and edges of a run; nothing is set up and nothing lies on the edges yet.
+    """Make the nodes and edges of a run; nothing is set up and nothing is on the edges yet.
 
-    What is inside of subgraphs that iterate is part of it, in depth-first order of adding like all else (G4).
+    The insides of subgraphs that iterate are part of it, in depth-first order of adding like all else (G4).
     """
     parts = [_Part(flat, None)]
     for part in parts:  # grows while it is walked through
@@ -74,7 +71,7 @@ def build(core: Core, flat: FlatGraph, groups: Mapping[str, Group], *, loop: Gro
 
 
 def _derive(core: Core, parts: Sequence[_Part]) -> None:
-    """What follows from the structure as a whole: who works, by whose leave, and which edges are live."""
+    """Derive from the structure as a whole which nodes are enabled and gated, and which edges are live."""
     for worker in core.workers:
         if not worker.own_enabled or any(not scope.enabled for scope in worker.around):
             worker.block(DISABLED)
@@ -89,11 +86,11 @@ def _derive(core: Core, parts: Sequence[_Part]) -> None:
 
 
 class _Part:
-    """What becomes of one flat graph: of the whole, or of the inside of a subgraph that iterates.
+    """The running form of one flat graph: of the whole, or of the inside of a subgraph that iterates.
 
     Attributes:
       around: the border of that subgraph.
-      workers, scopes: by their numbers in the flat graph; `owners`: the workers of the scopes.
+      workers, scopes: by their numbers in the flat graph; `owners`: the running nodes of the scopes.
     """
 
     def __init__(self, flat: FlatGraph, around: Iteration | None) -> None:
@@ -104,7 +101,7 @@ class _Part:
         self.owners: list[RunningNode] = []
 
     def make_workers(self, core: Core, groups: Mapping[str, Group], loop: Group) -> None:
-        """Make the workers of nodes and subgraphs; each node knows those around it, outermost first."""
+        """Make the running nodes of nodes and subgraphs; each refers to the scopes around it, outermost first."""
         self.workers = [make_worker(core, flat_node, groups) for flat_node in self.flat.nodes]
         core.by_path.update((worker.path, worker) for worker in self.workers)
         for flat_scope in self.flat.scopes:
@@ -129,7 +126,7 @@ class _Part:
 
 
 def add_scope(core: Core, flat_scope: FlatScope, parent: Scope | None, loop: Group) -> tuple[Scope, RunningNode]:
-    """Make a subgraph, and the worker on which its automatic ports live."""
+    """Make a subgraph, and the running node that has its automatic ports."""
     options = flat_scope.options
     scope = Scope(flat_scope.index, flat_scope.path, parent, enabled=options.enabled)
     owner = RunningNode(core, flat_scope.path, flat_scope.subgraph, None, loop)
@@ -150,7 +147,7 @@ def _add_edge(core: Core, flat: FlatEdge, ends: Ends) -> None:
 
 
 class Ends:
-    """Finds the worker at the end of an edge; each input and output of the graph, or of what iterates, has one."""
+    """Finds the running node at the end of an edge; each port of the graph, or of one that iterates, has one."""
 
     def __init__(
         self,
@@ -167,7 +164,7 @@ class Ends:
         self._scopes = scopes
 
     def of(self, end: End) -> RunningNode:
-        """Give the worker."""
+        """Return the running node at an end."""
         if end.node >= 0:
             return self._workers[end.node]
         if end.node < -1:
@@ -177,7 +174,7 @@ class Ends:
         return self.at_border(end, self._around)
 
     def join(self, edge: Any, flat: FlatEdge) -> None:
-        """Lead an edge from end to end; where that is in another part there is what stands for the link to it (L1)."""
+        """Connect an edge to its ends; an end in another part is represented by an outlet or inlet (L1)."""
         if flat.target.node == LINK:
             source = self.of(flat.source)
             edge.join(source, self._outlet(flat.target.name, source.group))
@@ -231,7 +228,7 @@ class Ends:
 
 
 def make_worker(core: Core, flat_node: FlatNode, groups: Mapping[str, Group]) -> RunningNode:
-    """Make the worker of a node; it has no edges yet."""
+    """Make the running node of a node; it has no edges yet."""
     options = flat_node.options
     group = groups[options.group or "loop"]
     worker = RunningNode(core, flat_node.path, flat_node.node, options, group)
@@ -279,7 +276,7 @@ def describe(edge: Any, flat: FlatEdge, ends: Ends) -> None:
 
 
 def wire(edge: Any, flat: FlatEdge) -> None:
-    """Lead an edge from its source to its target, in its place in the order."""
+    """Connect an edge to its source and target, in its place in the order."""
     source: RunningNode = edge.source
     target: RunningNode = edge.target
     target.lead_in(edge, flat.target.kind, flat.target.name)
@@ -292,25 +289,25 @@ def wire(edge: Any, flat: FlatEdge) -> None:
 
 
 def unwire(edge: Any) -> None:
-    """Take an edge away from its source and target; what lies on it stays."""
+    """Disconnect an edge from its source and target; its tokens stay on it."""
     edge.target.lose_incoming(edge)
     edge.source.lose_outgoing(edge)
 
 
 def _not_piped_yet(token: Any) -> None:
-    """Stands for the operators of an edge until all nodes are set up."""
+    """Takes the place of the operators of an edge until all nodes are set up."""
     raise UsageError("an event with operators on its edge was triggered in setup(): trigger it in a firing or a slot")
 
 
 def derive_release(edge: Any) -> None:
-    """Find out when a token on an edge is processed, and whether what it enables goes next (F5, R2)."""
+    """Derive when a token on an edge is processed, and whether the node that it enables goes next (F5, R2)."""
     if type(edge) is not EventEdge:
         sequential = _is_sequential(edge)
         edge.be_released(sequential=sequential, depth_first=sequential and _stays(edge))
 
 
 def _is_sequential(edge: Any) -> bool:
-    """F5: the consumer's mode; `auto` is sequential within a group. A delay ends the wave whatever the mode (P7)."""
+    """Return the consumer's mode: `auto` is sequential within a group (F5). A delay ends the wave in any mode (P7)."""
     target: RunningNode = edge.target
     release = target.options.release if target.options is not None and target.concurrent is None else "pipelined"  # F14
     if type(edge) is BufferEdge and edge.initial:
@@ -321,14 +318,14 @@ def _is_sequential(edge: Any) -> bool:
 
 
 def _stays(edge: Any) -> bool:
-    """R2: within a group that goes depth first; what comes from outside is a wave of its own."""
+    """Return whether the edge stays in a group that goes depth first; tokens from outside are a wave of their own (R2)."""
     source: RunningNode = edge.source
     target: RunningNode = edge.target
     return source.options is not None and source.group is target.group and source.group.depth_first
 
 
 def prepare_slot(worker: RunningNode, name: str) -> EventEdge:
-    """Make the edge by which signals come into a slot from outside the graph; it counts as active (P10, A4)."""
+    """Make the edge for signals from outside the graph into a slot; it counts as active (P10, A4)."""
     core = worker.core
     edge = EventEdge(core.edges[-1].index + 1 if core.edges else 0, outside_label(worker, name), True)
     outside = RunningNode(core, "", None, None, worker.group)
@@ -346,12 +343,12 @@ def prepare_slot(worker: RunningNode, name: str) -> EventEdge:
 
 
 def outside_label(worker: RunningNode, slot: str) -> str:
-    """What the edge is called by which signals come into a slot from outside."""
+    """Return the label of the edge for signals from outside into a slot."""
     return f"outside -> {worker.path}.{slot}" if worker.path else f"outside -> {slot}"
 
 
 def mark_scope(scope: Scope) -> None:
-    """Find out whether somebody cares about the activity of a subgraph; those of others cost nothing."""
+    """Watch the activity of a subgraph if something depends on it; that of others costs nothing."""
     owner = scope.worker
     assert owner is not None
     if scope.gates or owner.active_for_s is not None or not owner.events.keys().isdisjoint(_OF_ACTIVITY):
@@ -359,7 +356,7 @@ def mark_scope(scope: Scope) -> None:
 
 
 def watch_scope(scope: Scope) -> None:
-    """Somebody cares about A(subgraph): derive it from now on (G2)."""
+    """Derive A(subgraph) from now on (G2)."""
     if scope.watched:
         return
     scope.watch()

@@ -1,6 +1,6 @@
-"""Lets the ports of a node lead into the run: what `send` and `trigger` do while its graph runs (rules F3, F8, A4).
+"""Connects the ports of a node to the run: what `send` and `trigger` do while its graph runs (rules F3, F8, A4).
 
-Bound at each setup. Stands on `sending` and `firing`.
+This happens at each setup.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def bind(worker: RunningNode) -> None:
 
 
 def _show(worker: RunningNode, name: str, value: Any) -> None:
-    """R7: a node has set what it alone sets; whoever watches sees it, from a thread in order with what it sends."""
+    """Trace a parameter that only the node sets (R7); from a thread, in order with what it sends."""
     core = worker.core
     if core.trace_changes is None:
         return
@@ -67,7 +67,7 @@ def _trace_set(worker: RunningNode, name: str, value: Any) -> None:
 
 
 def bind_event(worker: RunningNode, name: str) -> RunningEvent:
-    """Make the running event of a declared or automatic event, and let the port trigger it."""
+    """Make the running event of a declared or automatic event, and let its port trigger it."""
     event = worker.events.get(name)
     relayed = worker.scope is not None and not is_automatic_event(name)
     if event is None:
@@ -91,7 +91,7 @@ def bind_event(worker: RunningNode, name: str) -> RunningEvent:
         port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     else:
         emit = slots.emitter(event)
-        port.trigger = emit  # in place of the method, which would only call it
+        port.trigger = emit  # instead of the method, which would only call it
         port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     port._emit_wait = partial(worker.core.code.trigger_wait, event)
     if worker.concurrent is not None or worker.attempts is not None:
@@ -110,7 +110,7 @@ def bind_event(worker: RunningNode, name: str) -> RunningEvent:
     if is_automatic_event(name) and worker.core.started:
         worker.watch()
         worker.changed()
-        bind(worker)  # what it triggers may have consequences now
+        bind(worker)  # what it triggers may have consequences from now on
     return event
 
 
@@ -127,13 +127,13 @@ def _keep(event: RunningEvent, value: Any, activity: int | None, stamp: float | 
 def _checked(
     worker: RunningNode, port: EventPort[Any], emit: Callable[..., Any]
 ) -> Callable[[Any, int | None, float | None], Any]:
-    """In debug mode a signal's value must be of its event's type; none at all always is (T2)."""
+    """Check in debug mode that a signal's value is of its event's type; no value always is (T2)."""
 
     def checked(value: Any, activity: int | None, stamp: float | None) -> Any:
         plain = value.value if type(value) is Token else value
         if plain is not None and not accepts(plain, port.type):
             raise TypeError(f'event "{port.path}" is declared {describe(port.type)}, got {describe_value(plain)}')
-        if host.on_loop():  # from a thread values are looked at when they are on their edges
+        if host.on_loop():  # values from a thread are checked when they are on their edges
             need_unwritten(worker, port.name, value)
         return emit(value, activity, stamp)
 
@@ -142,10 +142,7 @@ def _checked(
 
 
 def bind_automatic(worker: RunningNode) -> None:
-    """Let the automatic events of a node.
-
-    Subgraph or graph that have edges or subscribers be triggered and listened to.
-    """
+    """Bind the automatic events of a node, subgraph or graph that have edges or subscribers."""
     if worker.node is None:
         return
     made = [
@@ -161,7 +158,7 @@ def bind_automatic(worker: RunningNode) -> None:
 def _from_thread(
     worker: RunningNode, event: RunningEvent, value: Any, activity: int | None, stamp: float | None
 ) -> None:
-    """F3: a signal from a thread leaves at the loop's next pass, in order and before the outputs of its firing."""
+    """A signal from a thread leaves in the loop's next pass, in order and before the outputs of its firing (F3)."""
     host = worker.core.runtime
     if host.on_loop():
         trigger(event, value, activity, stamp)
@@ -170,7 +167,7 @@ def _from_thread(
 
 
 def bind_start(boundary: RunningNode, port: EventPort[None]) -> RunningEvent | None:
-    """Let the graph's `start` reach its edges and subscribers; None if it has neither (A10)."""
+    """Bind the graph's `start` if it has edges or subscribers (A10)."""
     event = boundary.events.get("start")
     if event is None and port._observers:
         event = boundary.make_event("start", port)
@@ -180,7 +177,7 @@ def bind_start(boundary: RunningNode, port: EventPort[None]) -> RunningEvent | N
 
 
 def release_ports(worker: RunningNode) -> None:
-    """The run is over: what the ports led to is gone, their subscribers are told."""
+    """The run is over: disconnect the ports and complete their subscriptions."""
     node = worker.node
     if node is not None:
         worker.hide_activity()

@@ -1,8 +1,6 @@
-"""Ports of subgraphs, seen from outside a run: boxes are dissolved, so their ports stand for those behind them.
+"""Ports of subgraphs, seen from outside a run (rule G1): boxes are dissolved, so their ports represent others.
 
-(rule G1).
-
-Looks at the graph as it was drawn. Stands on `graph`.
+This uses the graph as it was drawn.
 """
 
 from __future__ import annotations
@@ -17,13 +15,13 @@ __all__ = ["events_behind", "is_at", "is_relay", "slots_behind"]
 
 
 def is_relay(port: Any) -> bool:
-    """Whether it is a declared port of a subgraph that is dissolved."""
+    """Return whether it is a declared port of a subgraph that is dissolved."""
     node = getattr(port, "node", None)
     return is_box(node) and not iterated(node) and port.name in getattr(node._type, f"{port.kind}s", ())
 
 
 def slots_behind(port: Any) -> list[tuple[Any, bool]]:
-    """Where signals into a subgraph's slot arrive, and whether all edges on the way are active."""
+    """Return where signals into a subgraph's slot arrive, and whether all edges on the way are active."""
     found: list[tuple[Any, bool]] = []
     waiting, seen = [(port, True)], [port]
     while waiting:
@@ -40,7 +38,7 @@ def slots_behind(port: Any) -> list[tuple[Any, bool]]:
 
 
 def events_behind(port: Any) -> list[Any]:
-    """The events of nodes whose signals leave by a subgraph's event."""
+    """Return the events of nodes whose signals leave by a subgraph's event."""
     found: list[Any] = []
     waiting, seen = [port], [port]
     while waiting:
@@ -55,21 +53,21 @@ def events_behind(port: Any) -> list[Any]:
 
 
 def _onward(relay: Any) -> Iterator[Any]:
-    """Edges that go on behind a relay: inside behind a slot, outside behind an event."""
+    """Return the edges after a relay: inside after a slot, outside after an event."""
     if relay.kind == "event":
         return (edge for edge in relay.graph.edges if edge.source is relay)
     return (edge for edge in relay.node._graph.edges if getattr(edge.source, "outer", None) is relay)
 
 
 def _back(relay: Any) -> Iterator[Any]:
-    """Edges that lead to a relay: from inside to an event, from outside to a slot."""
+    """Return the edges before a relay: from inside to an event, from outside to a slot."""
     if relay.kind == "event":
         return (edge for edge in relay.node._graph.edges if getattr(edge.target, "outer", None) is relay)
     return (edge for edge in relay.graph.edges if edge.target is relay)
 
 
 def is_at(segments: Sequence[Any], what: Any) -> bool:
-    """Whether an edge of a run has an edge as drawn for a part, or begins, ends or passes at a port."""
+    """Return whether an edge of a run contains a drawn edge, or starts at, ends at or passes a port."""
     return any(
         what is segment or what in (segment.source, segment.target, *_outer(segment.source), *_outer(segment.target))
         for segment in segments

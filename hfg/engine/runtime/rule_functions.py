@@ -1,4 +1,4 @@
-"""Ties the deciding modules together: what those below ask of those above. Stands on all, decides nothing."""
+"""Connects decisions with the modules above them: `core.RuleCallbacks` filled in."""
 
 from __future__ import annotations
 

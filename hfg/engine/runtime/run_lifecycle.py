@@ -67,7 +67,7 @@ class RunLifecycle:
     async def set_up(self) -> bool:
         """Set up all nodes; whether all went well. Else the run is over."""
         engine = self._engine
-        engine.begin()
+        engine.time.begin()
         self._lost = OrphanTasks.notice(engine.loop, self._asking)
         self._watch = watchdog.watch(engine.core, engine.settings.block_warning_s, virtual=engine.virtual)
         return await self._set_up_all(engine.core)
@@ -177,7 +177,7 @@ class RunLifecycle:
     def feed(self, source: Any, edge: Any, operators: tuple[Any, ...]) -> None:
         """An outside observable holds the run open until it completes (R5)."""
         engine = self._engine
-        engine.hold()
+        engine.quiet.hold()
         open_ = [True]
 
         def over(error: BaseException | None) -> None:
@@ -187,7 +187,7 @@ class RunLifecycle:
                     problem = NodeError(edge.target.path, f'the observable that feeds "{edge.label}"', error)
                     problem.__cause__ = error
                     engine.finish("failed", problem)
-                engine.unhold()
+                engine.quiet.unhold()
 
         dispose = rx.feed_from_observable(source, edge, operators, engine.scheduler, engine.from_any_thread, over)
 

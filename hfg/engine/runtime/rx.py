@@ -1,8 +1,8 @@
 """reactivex in a run: a scheduler on the run's clock, operators on edges, and observables that feed slots (rule P9).
 
-`AsyncIOScheduler.now` is wall time, so in virtual time `delay` would never emit; and without a scheduler `debounce`
-runs on a thread. So the run brings its own. What operators on an edge want done now is done now, for a chain that is
-connected a pass of the loop later has lost what was triggered until then. Stands on `sending`.
+`AsyncIOScheduler.now` is wall time, so `delay` would never emit in virtual time. Without a scheduler `debounce`
+runs on a thread. So the run has its own. What operators on an edge schedule for now happens at once, because a chain that is
+connected a pass of the loop later would lose what was triggered until then.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ __all__ = ["RunScheduler", "feed_from_observable", "kick", "pipe_edge"]
 
 
 class RunScheduler(PeriodicScheduler):
-    """Schedules on the run's clock, real or virtual; what it holds keeps the run from being quiet."""
+    """Schedules on the run's clock, real or virtual; pending actions prevent quiet."""
 
     def __init__(self, host: Runtime) -> None:
         super().__init__()
@@ -47,7 +47,7 @@ class RunScheduler(PeriodicScheduler):
         return self.to_datetime(self._host.now())
 
     def schedule(self, action: abc.ScheduledAction[Any], state: Any = None) -> abc.DisposableBase:
-        """Run the action at the loop's next pass."""
+        """Run the action in the loop's next pass."""
         return self._at(self._host.now(), action, state)
 
     def schedule_relative(
@@ -78,11 +78,10 @@ class RunScheduler(PeriodicScheduler):
 
 
 class _EdgeScheduler(RunScheduler):
-    """For operators on one edge: what is to be done now is done at once, one after the other (P9).
+    """For operators on one edge: what is due now runs at once, one after the other (P9).
 
-    As reactivex does it where nobody names a scheduler. What never comes to an end lets the loop have its turn. Who
-    waits for the edge waits for a timer while something is pending (F8), and so does the next element of what iterates
-    around it (G4).
+    This is what reactivex does without a scheduler. Endless actions let the loop have its turn. While something is
+    pending, whoever waits for the edge waits for a timer (F8), and so does the next element of an iteration (G4).
     """
 
     def __init__(self, host: Runtime, edge: EventEdge) -> None:
@@ -94,7 +93,7 @@ class _EdgeScheduler(RunScheduler):
 
     @override
     def schedule(self, action: abc.ScheduledAction[Any], state: Any = None) -> abc.DisposableBase:
-        """Run the action before this returns, or behind the one that is running."""
+        """Run the action before this returns, or after the one that is running."""
         inner = SingleAssignmentDisposable()
 
         def run() -> None:
@@ -109,7 +108,7 @@ class _EdgeScheduler(RunScheduler):
     @override
     def _at(self, when: float, action: abc.ScheduledAction[Any], state: Any) -> abc.DisposableBase:
         pending = SingleAssignmentDisposable()
-        pending.disposable = Disposable(self._over)  # once, whether it rings or is given up
+        pending.disposable = Disposable(self._over)  # once, whether it fires or is cancelled
         self._edge.ripen(1)
         if self._within is not None:
             self._within.count_timer(1)
@@ -139,7 +138,7 @@ class _EdgeScheduler(RunScheduler):
 
 
 def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Runtime) -> Callable[[], None]:
-    """Put operators on an event edge, in front of its queue; gives back what takes them off."""
+    """Put operators on an event edge, ahead of its queue. Return what removes them."""
     newest: float | None = None
     subscription = SerialDisposable()
     scheduler = _EdgeScheduler(host, edge)
@@ -151,7 +150,7 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Runtime) -> Cal
 
         def into(token: Token[Any]) -> None:
             nonlocal newest
-            if edge.complete is None:  # the event has completed, as an input has that was given END (F13)
+            if edge.complete is None:  # the event has completed, like an input that has received END (F13)
                 drop(edge, token, "ended")
                 return
             newest = token.stamp if newest is None else max(newest, token.stamp)
@@ -163,16 +162,16 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Runtime) -> Cal
         )
 
     def out(item: Any) -> None:
-        if not reaches(edge):  # nothing is sent to who is disabled (F10)
+        if not reaches(edge):  # nothing is sent to a disabled node (F10)
             return
         if type(item) is Token:
             enqueue(edge, item.value, 0, item.stamp)
-        else:  # before anything went in it is a signal of a timer (T5)
+        else:  # before the first token it is a signal of a timer (T5)
             enqueue(edge, item, 0, host.now() if newest is None else newest)
         kick(edge)
 
     def failed(error: Exception) -> None:
-        edge.take_complete()  # nothing goes through them any more
+        edge.take_complete()  # nothing passes them any more
         operator_failed(edge, error)
 
     edge.pipe_afresh_by(connect)
@@ -181,7 +180,7 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Runtime) -> Cal
 
 
 def kick(edge: EventEdge) -> None:
-    """Something lies on the edge that came from outside a firing."""
+    """Something is on the edge that came from outside a firing."""
     core = edge.target.core
     if not core.pumping:
         core.runtime.kick()
@@ -195,15 +194,15 @@ def feed_from_observable(
     hand_over: Callable[[Callable[[], None]], None],
     over: Callable[[BaseException | None], None],
 ) -> Callable[[], None]:
-    """Let an observable feed a slot or input; each edge has an observer of its own, for one that completes is dead.
+    """Let an observable feed a slot or input. Each edge has its own observer, because a completed one is dead.
 
     Args:
-      source: may emit on any thread.
-      edge: where its items go, as tokens.
+      source: the observable; it may emit on any thread.
+      edge: receives its items as tokens.
       operators: as with `through=`.
       scheduler: the run's.
-      hand_over: brings a call to the loop, in order.
-      over: told once when the observable completes or fails.
+      hand_over: makes a call on the loop, in order.
+      over: called once when the observable completes or fails.
     """
     loop_thread = threading.get_ident()
 

@@ -243,7 +243,7 @@ class Worker:
     async def _follow(self, engine: Engine, clock: RunClock) -> None:
         """Go by the clock of the run, as far as that is known here."""
         if clock.machine == machine():
-            engine.follow(clock.ahead_s, clock.began_s, float)
+            engine.time.follow(clock.ahead_s, clock.began_s, float)
             return
         self._offset = offset = Offset()
         while offset.heard < _ROUNDS:
@@ -253,7 +253,7 @@ class Worker:
             offset.hear(message.asked, message.told, time.monotonic())
             self._asked = max(self._asked - 1, 0)
         used_s = offset.offset_s
-        engine.follow(clock.ahead_s + used_s, clock.began_s, lambda: offset.error_of(used_s, time.monotonic()))
+        engine.time.follow(clock.ahead_s + used_s, clock.began_s, lambda: offset.error_of(used_s, time.monotonic()))
         self._ask_time_later()
 
     def _ask_time_later(self) -> None:
@@ -348,5 +348,5 @@ def _closed(name: str, engine: Any, failed: Any) -> messages.Closed:
         [str(error) for error in core.errors],
         core.lost_activity,
         failed,
-        engine.clock_within_s(),
+        engine.time.within_s(),
     )

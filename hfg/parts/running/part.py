@@ -186,7 +186,7 @@ class Part:
         self._start: dict[str, int] = {}  # where an incarnation other than the first resumes incoming edges
         self._cleared: asyncio.Future[None] | None = None  # set while a caller waits until it is empty
         self._leaving = False
-        engine.leave_quiet_to(self._nothing_moves)
+        engine.quiet.leave_to(self._nothing_moves)
         engine.callbacks.begun.append(self._begun)
         engine.callbacks.pumped.append(self._pumped)
 
@@ -254,7 +254,7 @@ class Part:
                 f'group "{self.name}" is emptied of tokens before an edit, so that none is lost if its '
                 "process dies; but the run is paused: call run.resume() first"
             )
-        self.engine.hold()
+        self.engine.quiet.hold()
         for inlet in self.inlets.values():
             inlet.hold(True)
         try:
@@ -272,7 +272,7 @@ class Part:
             for inlet in self.inlets.values():
                 inlet.hold(False)
                 inlet.lay()
-            self.engine.unhold()
+            self.engine.quiet.unhold()
             self.engine.kick()
 
     def connect(self, outgoing: Mapping[str, Outgoing], incoming: Mapping[str, Incoming]) -> None:
@@ -761,13 +761,13 @@ class Part:
             case "grow":
                 return self._grow(question.value)
             case "held":
-                return engine.is_held_open()
+                return engine.quiet.is_held_open()
             case "give_up":
-                return engine.give_up()
+                return engine.quiet.give_up()
             case "complete":
-                return engine.complete_operators() or engine.core.timers > 0
+                return engine.quiet.complete_operators() or engine.core.timers > 0
             case "end":
-                return engine.end_events()
+                return engine.quiet.end_events()
             case "stuck":
                 return quiescence.stuck(engine.core)
             case "finish":

@@ -85,7 +85,7 @@ class CutRun(Run):
             stamp = value.stamp if stamp is None else stamp
             value = value.value
         parcel = self._asking.crossing.pack(port.path, port.type, Token(value))
-        self._engine.hold()  # tokens in transit can still revive the graph
+        self._engine.quiet.hold()  # tokens in transit can still revive the graph
         try:
             await self._answer(
                 home,
@@ -97,7 +97,7 @@ class CutRun(Run):
                 stamp=stamp,
             )
         finally:
-            self._engine.unhold()
+            self._engine.quiet.unhold()
 
     def _set(self, parameter: ParameterPort[Any], value: object) -> None:
         """Refuse invalid values on this side before anything is set anywhere."""
@@ -158,16 +158,14 @@ class CutRun(Run):
         if self._engine.core.over and ended:
             raise NotRunning(ended)
         asked = self._asking.ask(part, verb, **arguments)
-        ending = asyncio.ensure_future(self._engine.ending.wait())
         try:
-            await asyncio.wait((asked, ending), return_when=asyncio.FIRST_COMPLETED)
+            await self._engine.or_end(asked)
             if asked.done():
                 return asked.result()
             if ended:
                 raise NotRunning(ended)
             return None
         finally:
-            ending.cancel()
             asked.cancel()
 
     # --- holding it still -------------------------------------------------------------------------------------------

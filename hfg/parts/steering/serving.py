@@ -179,7 +179,7 @@ class Serving:
         engine = self._composition.engine
         core = engine.core
         found: dict[str, Any] = {"nodes": node_reports(core), "edges": edge_reports(core)}
-        found["clock_within_s"] = engine.clock_within_s()
+        found["clock_within_s"] = engine.time.within_s()
         found |= {"errors": [str(error) for error in core.errors], "lost_activity": core.lost_activity}
         if "glance" in what:
             found["glance"] = self.run.glance()
