@@ -318,7 +318,7 @@ def _is_sequential(edge: Any) -> bool:
 
 
 def _stays(edge: Any) -> bool:
-    """Return whether the edge stays in a group that goes depth first; tokens from outside are a wave of their own (R2)."""
+    """Return whether the edge stays in a depth-first group; tokens from outside are a wave of their own (R2)."""
     source: RunningNode = edge.source
     target: RunningNode = edge.target
     return source.options is not None and source.group is target.group and source.group.depth_first

@@ -1,8 +1,8 @@
 """reactivex in a run: a scheduler on the run's clock, operators on edges, and observables that feed slots (rule P9).
 
 `AsyncIOScheduler.now` is wall time, so `delay` would never emit in virtual time. Without a scheduler `debounce`
-runs on a thread. So the run has its own. What operators on an edge schedule for now happens at once, because a chain that is
-connected a pass of the loop later would lose what was triggered until then.
+runs on a thread. So the run has its own. What operators on an edge schedule for now happens at once: a chain
+that is connected a pass of the loop later would lose what was triggered until then.
 """
 
 from __future__ import annotations
