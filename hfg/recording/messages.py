@@ -16,15 +16,16 @@ import numpy as np
 
 from hfg.base.token import Token
 from hfg.encoding.pictures import need_fair_size
-from hfg.engine.observing.recorder import Told
 from hfg.errors import UsageError
 from hfg.recording import schemas
 from hfg.recording.forms import is_plain
 from hfg.recording.values import CannotKeep, Codec
+from hfg.trace import TraceEvent
 from hfg.types import describe, describe_value
 
 __all__ = [
     "EVENTS",
+    "ITEM",
     "MARKERS",
     "Firings",
     "Images",
@@ -33,8 +34,18 @@ __all__ = [
     "Timed",
     "TokenReader",
     "TokenWriter",
+    "TokensLeftOut",
+    "Told",
     "circumstances",
 ]
+
+ITEM: Final = 5
+"""Entries per token in the writer's queue, one flat list, which gives the garbage collector nothing to look at.
+
+They are: the place (a `TokenWriter`; None: an event of the run itself), the token or event, its stamp, its number on
+its edge, and when it passed, on the run's clock. What passes in a wave of a fused region is not a token but a value
+(None: NO_MESSAGE), for which stamp and number count; otherwise these two have no meaning."""
+
 
 MARKERS: Final = "hfg/markers"
 """Channel of markers: silence and the ends of streams."""
@@ -45,6 +56,34 @@ EVENTS: Final = "hfg/events"
 Images = Literal["raw", "png", "jpeg"]
 
 _TOLD: Final = ("began", "call", "beside", "silent", "last", "waited", "refused")
+
+
+class Told(Token[Any], frozen=True):
+    """A token that was not sent as most are, at the end of a firing that started at its stamp.
+
+    A player of the node has to send it in the same way.
+
+    Attributes:
+      began: when the firing started, if its stamp does not show it.
+      call: the number of the slot call in which it was triggered; 0: in none.
+      beside: it was triggered in no firing and no call.
+      silent: the function was not run in this firing.
+      last: `end()` has written or triggered it.
+      waited: the firing waited, though no time passed.
+      refused: it replaces a value that cannot be recorded, so that firings stay aligned.
+    """
+
+    began: float | None = None
+    call: int = 0
+    beside: bool = False
+    silent: bool = False
+    last: bool = False
+    waited: bool = False
+    refused: bool = False
+
+
+class TokensLeftOut(TraceEvent, frozen=True):
+    """There was no room for the tokens that passed here."""
 
 
 class Firings:

@@ -14,7 +14,6 @@ import msgspec
 from hfg.base.logs import Log
 from hfg.engine import Run
 from hfg.engine.model.running_node import DISABLED
-from hfg.engine.observing.recorder import Place, Recorder
 from hfg.errors import GraphError, UsageError
 from hfg.graph import commands
 from hfg.graph.flat import flatten
@@ -23,6 +22,7 @@ from hfg.ports import Port
 from hfg.ports.automatic import sent_name
 from hfg.recording.forms import reference
 from hfg.recording.messages import Firings, Images, TokenWriter
+from hfg.recording.recorder import Recorder
 from hfg.recording.writing import RecordingWriter, open_new
 from hfg.types import describe
 
@@ -168,7 +168,7 @@ class Recording:
         }
         if kind is not None and port.kind == "output" and len(kind.outputs) > 1:
             place.firings = self._firings.setdefault(node, Firings())
-        typed: Place = place
+        typed: TokenWriter = place
         self._recorder.look_at(port, typed)
         self._writer.places.append(place)
         self._places[port] = place

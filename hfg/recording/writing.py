@@ -23,10 +23,18 @@ import numpy as np
 import numpy.typing as npt
 
 from hfg.base.token import NO_MESSAGE, Marker, Token
-from hfg.engine.observing.recorder import ITEM, TokensLeftOut
 from hfg.errors import UsageError
 from hfg.recording.mcap import Writer
-from hfg.recording.messages import EVENTS, MARKERS, Marked, PlainToken, TokenWriter, circumstances
+from hfg.recording.messages import (
+    EVENTS,
+    ITEM,
+    MARKERS,
+    Marked,
+    PlainToken,
+    TokensLeftOut,
+    TokenWriter,
+    circumstances,
+)
 from hfg.trace import NodeEnabled, StructureChanged
 
 __all__ = ["PROFILE", "RecordingWriter", "is_there", "open_new"]

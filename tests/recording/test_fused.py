@@ -13,9 +13,10 @@ import pytest
 from mcap.reader import make_reader
 
 import hfg
-from hfg.engine.observing.recorder import ITEM, Recorder
 from hfg.engine.runtime import settings
 from hfg.recording import record
+from hfg.recording.messages import ITEM
+from hfg.recording.recorder import Recorder
 from hfg.testing import nodes, reference_run
 from hfg.testing.reference.structure import dissolve
 from tests.support.making import SYNCHRONOUS, Allowed, random_plan

@@ -284,8 +284,8 @@ class SlowDisk:
 def test_without_loss_nothing_is_missing_however_far_the_disk_is_behind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hfg.engine.observing.recorder.MOST_ITEMS", 100)
-    monkeypatch.setattr("hfg.engine.observing.recorder._WAKE_AFTER", 30)
+    monkeypatch.setattr("hfg.recording.recorder.MOST_ITEMS", 100)
+    monkeypatch.setattr("hfg.recording.recorder._WAKE_AFTER", 30)
     for clock in ("virtual", "real"):
         graph = build(count=5000, rate=None)
         found: list[Recording] = []
@@ -300,8 +300,8 @@ def test_without_loss_nothing_is_missing_however_far_the_disk_is_behind(
 def test_what_there_is_no_time_for_is_counted_in_the_file_and_the_rest_is_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hfg.engine.observing.recorder.MOST_ITEMS", 100)
-    monkeypatch.setattr("hfg.engine.observing.recorder._WAKE_AFTER", 30)
+    monkeypatch.setattr("hfg.recording.recorder.MOST_ITEMS", 100)
+    monkeypatch.setattr("hfg.recording.recorder._WAKE_AFTER", 30)
     found = recorded(build(count=5000, rate=None), tmp_path / "run.mcap", lossless=False)
     assert found.held_s == 0
     left_out = found.left_out.get("camera.out", 0)

@@ -23,8 +23,7 @@ from hfg.engine.fusion.explaining import Explanation, explain
 from hfg.engine.model.running_node import UNREADY
 from hfg.engine.observing.consumers import Listener
 from hfg.engine.observing.glance import Glance, glance_at
-from hfg.engine.observing.recorder import RunRecording
-from hfg.engine.observing.report import Report, RunPage
+from hfg.engine.observing.report import Report, RunPage, RunRecording
 from hfg.engine.observing.sampling import Sampler
 from hfg.engine.observing.statistics import Statistics
 from hfg.engine.observing.taps import Tap

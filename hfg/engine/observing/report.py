@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from types import TracebackType
 from typing import Any, Protocol
 
 import msgspec
@@ -20,6 +21,7 @@ __all__ = [
     "NodeReport",
     "Report",
     "RunPage",
+    "RunRecording",
     "edge_report",
     "edge_reports",
     "node_report",
@@ -203,6 +205,49 @@ class RunPage(Protocol):
           depth: so many subgraphs inside each other are shown open; None folds none.
           fold: paths of subgraphs that are folded whatever the depth.
         """
+
+
+class RunRecording(Protocol):
+    """The result of `run.record`: a recording in progress, or its result. `hfg.recording` has its class."""
+
+    @property
+    def path(self) -> Path:
+        """Of the file."""
+
+    @property
+    def ports(self) -> list[str]:
+        """The paths of the ports that are recorded."""
+
+    @property
+    def error(self) -> BaseException | None:
+        """Why nothing more is written; None if all is well."""
+
+    @property
+    def tokens(self) -> int:
+        """How many tokens were written, markers too."""
+
+    @property
+    def bytes_written(self) -> int:
+        """How long the file is by now."""
+
+    @property
+    def left_out(self) -> dict[str, int]:
+        """Tokens for which there was no time, or no way to write them, by port."""
+
+    @property
+    def held_s(self) -> float:
+        """For how long nodes had to wait for the recording."""
+
+    def stop(self) -> None:
+        """Record nothing more; what has passed is still written. Does nothing the second time."""
+
+    async def close(self) -> None:
+        """Record nothing more, and wait until the file is whole."""
+
+    async def __aenter__(self) -> RunRecording: ...
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None: ...
 
 
 def node_report(worker: RunningNode) -> NodeReport:

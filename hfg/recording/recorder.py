@@ -1,23 +1,20 @@
-"""Hands what passes chosen ports of a run to a thread that writes it down (rule R7).
+"""Passes what is observed at ports of a run to the thread that writes it (rule R7).
 
-All that is done for a token on the loop is to put it into a list with the time; values that somebody may change later
-are copied. The thread takes what is there in batches. Where it cannot keep up, either the nodes whose ports are
-recorded start nothing new until it can (lossless: back-pressure, counted as waiting for the "recorder"), or what finds
-no place is left out and counted. In virtual time, where chance must not tell, the loop itself waits for the thread.
-Stands on taps and consumers.
+On the loop, a token is only put into a list, with the time; values that may change later are copied. The thread takes
+batches from the list. If it cannot keep up, recorded nodes start nothing new until it can (lossless: back-pressure, in
+which they wait for the "recorder"), or tokens without room are left out and counted. In virtual time, where the result
+must not depend on chance, the loop itself waits for the thread.
 """
 
 from __future__ import annotations
 
 import asyncio
 import threading
-from collections import deque
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from time import monotonic
-from types import SimpleNamespace, TracebackType
-from typing import Any, Final, Protocol
+from types import SimpleNamespace
+from typing import Any, Final
 
 from msgspec.structs import replace
 
@@ -29,27 +26,13 @@ from hfg.engine.observing.consumers import Consumers, Listener
 from hfg.engine.observing.taps import Taps
 from hfg.engine.rules.agenda import unblock
 from hfg.engine.runtime.engine import Engine
+from hfg.recording.messages import ITEM, TokensLeftOut, TokenWriter, Told
+from hfg.recording.writing import RecordingWriter
 from hfg.trace import TraceEvent
 
-__all__ = [
-    "ITEM",
-    "MOST_BYTES",
-    "MOST_ITEMS",
-    "Place",
-    "Recorder",
-    "RecordingThread",
-    "RunRecording",
-    "TokensLeftOut",
-    "Told",
-]
+__all__ = ["MOST_BYTES", "MOST_ITEMS", "Recorder"]
 
 _LOGGER = Log("hfg.engine")
-
-ITEM: Final = 5
-"""What lies before the thread is one flat list, so that nothing is made for a token that Python's garbage collector
-would have to look at: where it passed (a `Place`; None: an event of the run itself), what, and when on the run's clock.
-What passes in a wave of a fused region is no token, but a value (None: NO_MESSAGE), and behind it stand its stamp and
-its number on its edge; behind a token or an event nothing is meant by these two. The time is the last of the five."""
 
 MOST_ITEMS: Final = 50_000
 """Tokens that may lie before the thread."""
@@ -62,122 +45,6 @@ _JOIN_S: Final = 0.002
 _NO_SOURCE: Final = SimpleNamespace(is_source=False)
 
 
-class Place(Protocol):
-    """A port or an edge that is recorded.
-
-    Attributes:
-      path: of the port.
-      keep: makes of a value something that nobody changes, and says how many bytes that takes, more or less; None: its
-        values are small, and cannot be changed anyway.
-      left_out: how many tokens there was no room for.
-      refused: how many values could not be kept.
-    """
-
-    path: str
-    keep: Callable[[Any], tuple[Any, int]] | None
-    left_out: int
-    refused: int
-
-
-class RecordingThread(Protocol):
-    """Who writes.
-
-    Attributes:
-      items: what lies before it; it takes from the front.
-      sizes: in the same order, of those values that were kept by `Place.keep`.
-      bytes_taken: the sum of those that it has taken.
-      error: why it writes no more; None while it does.
-    """
-
-    items: list[Any]
-    sizes: deque[int]
-    bytes_taken: int
-    error: BaseException | None
-
-    def wake(self) -> None:
-        """There is something to write."""
-
-    def is_alive(self) -> bool:
-        """Whether it still writes."""
-
-    def join(self, timeout: float | None = None) -> None:
-        """Wait for its end."""
-
-    def finish(self) -> None:
-        """Nothing more will come: write what is left and close the file."""
-
-
-class RunRecording(Protocol):
-    """What `run.record` gives: a recording under way, or what came of it. `hfg.recording` has its class."""
-
-    @property
-    def path(self) -> Path:
-        """Of the file."""
-
-    @property
-    def ports(self) -> list[str]:
-        """The paths of the ports that are recorded."""
-
-    @property
-    def error(self) -> BaseException | None:
-        """Why nothing more is written; None if all is well."""
-
-    @property
-    def tokens(self) -> int:
-        """How many tokens were written, markers too."""
-
-    @property
-    def bytes_written(self) -> int:
-        """How long the file is by now."""
-
-    @property
-    def left_out(self) -> dict[str, int]:
-        """Tokens for which there was no time, or no way to write them, by port."""
-
-    @property
-    def held_s(self) -> float:
-        """For how long nodes had to wait for the recording."""
-
-    def stop(self) -> None:
-        """Record nothing more; what has passed is still written. Does nothing the second time."""
-
-    async def close(self) -> None:
-        """Record nothing more, and wait until the file is whole."""
-
-    async def __aenter__(self) -> RunRecording: ...
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None: ...
-
-
-class Told(Token[Any], frozen=True):
-    """A token that did not come to be sent as it mostly is: at the end of a firing that began at its stamp.
-
-    Who plays the node that has sent it is to send it alike.
-
-    Attributes:
-      began: when the firing began, if its stamp does not say so.
-      call: the number of the slot call in which it was triggered; 0: in none.
-      beside: it was triggered in no firing and no call.
-      silent: the function was not run in this firing.
-      last: `end()` has written it, or triggered it.
-      waited: the firing waited, though no time passed.
-      refused: it stands in the place of a value that cannot be recorded, so that firings stay aligned.
-    """
-
-    began: float | None = None
-    call: int = 0
-    beside: bool = False
-    silent: bool = False
-    last: bool = False
-    waited: bool = False
-    refused: bool = False
-
-
-class TokensLeftOut(TraceEvent, frozen=True):
-    """There was no room for the tokens that passed here."""
-
-
 class _Looker:
     """Looks at one place.
 
@@ -188,7 +55,7 @@ class _Looker:
 
     __slots__ = ("end", "place", "put", "silent", "worker")
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: TokenWriter) -> None:
         self.place = place
         self.put: TokenTap = _no_token
         self.end = _nothing
@@ -205,7 +72,7 @@ class Recorder(Listener):
     """
 
     def __init__(
-        self, engine: Engine, consumers: Consumers, taps: Taps, thread: RecordingThread, *, lossless: bool
+        self, engine: Engine, consumers: Consumers, taps: Taps, thread: RecordingWriter, *, lossless: bool
     ) -> None:
         super().__init__(self._seldom_event, consumers, changes_only=True)
         self._engine = engine
@@ -224,7 +91,7 @@ class Recorder(Listener):
         self.held_s = 0.0
         self.times_held = 0
         self.on_structure: Callable[[], None] = _nothing
-        self.on_refused: Callable[[Place, Exception], None] = _no_word
+        self.on_refused: Callable[[TokenWriter, Exception], None] = _no_word
 
     @property
     def thread_waits_for(self) -> Callable[[], None]:
@@ -235,7 +102,7 @@ class Recorder(Listener):
         """On the run's clock."""
         return self._engine.now()
 
-    def look_at(self, what: Any, place: Place) -> None:
+    def look_at(self, what: Any, place: TokenWriter) -> None:
         """Record what passes there from now on.
 
         Raises:
@@ -303,7 +170,7 @@ class Recorder(Listener):
         if len(self._items) > self._mark:
             self._crowded()
 
-    def _leave_out(self, place: Place) -> None:
+    def _leave_out(self, place: TokenWriter) -> None:
         """There is no room for a token."""
         place.left_out += 1
         if not self._left_out:
@@ -311,7 +178,7 @@ class Recorder(Listener):
             now = self._engine.now()
             self._items.extend((None, TokensLeftOut(now), 0.0, 0, now))
 
-    def _look(self, place: Place, *, answers: bool) -> Callable[[Token[Any]], None]:
+    def _look(self, place: TokenWriter, *, answers: bool) -> Callable[[Token[Any]], None]:
         """Make what is called with each token; `answers`: each is a firing's, so silence stands in for one refused."""
         extend, items, sizes = self._items.extend, self._items, self._thread.sizes
         now = self._engine.now
@@ -489,5 +356,5 @@ def _no_token(_token: Token[Any]) -> None:
     pass
 
 
-def _no_word(_place: Place, _error: Exception) -> None:
+def _no_word(_place: TokenWriter, _error: Exception) -> None:
     pass
