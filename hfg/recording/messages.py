@@ -62,24 +62,15 @@ class Told(Token[Any], frozen=True):
     """A token that was not sent as most are, at the end of a firing that started at its stamp.
 
     A player of the node has to send it in the same way.
-
-    Attributes:
-      began: when the firing started, if its stamp does not show it.
-      call: the number of the slot call in which it was triggered; 0: in none.
-      beside: it was triggered in no firing and no call.
-      silent: the function was not run in this firing.
-      last: `end()` has written or triggered it.
-      waited: the firing waited, though no time passed.
-      refused: it replaces a value that cannot be recorded, so that firings stay aligned.
     """
 
-    began: float | None = None
-    call: int = 0
-    beside: bool = False
-    silent: bool = False
-    last: bool = False
-    waited: bool = False
-    refused: bool = False
+    began: float | None = None  # when the firing started, if its stamp does not show it
+    call: int = 0  # the number of the slot call in which it was triggered; 0: in none
+    beside: bool = False  # it was triggered in no firing and no call
+    silent: bool = False  # the function was not run in this firing
+    last: bool = False  # `end()` has written or triggered it
+    waited: bool = False  # the firing waited, though no time passed
+    refused: bool = False  # it replaces a value that cannot be recorded, so that firings stay aligned
 
 
 class TokensLeftOut(TraceEvent, frozen=True):

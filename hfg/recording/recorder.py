@@ -35,21 +35,21 @@ __all__ = ["MOST_BYTES", "MOST_ITEMS", "Recorder"]
 _LOGGER = Log("hfg.engine")
 
 MOST_ITEMS: Final = 50_000
-"""Tokens that may lie before the thread."""
+"""Tokens that may wait for the thread."""
 
 MOST_BYTES: Final = 128 * 1024 * 1024
-"""What their values may take, as far as that is known."""
+"""The memory that their values may take, as far as it is known."""
 
-_WAKE_AFTER: Final = 4000 * ITEM  # the thread looks a few times a second anyway
+_WAKE_AFTER: Final = 4000 * ITEM  # the thread looks a few times per second anyway
 _JOIN_S: Final = 0.002
 _NO_SOURCE: Final = SimpleNamespace(is_source=False)
 
 
 class _Looker:
-    """Looks at one place.
+    """Observes one place.
 
     Attributes:
-      worker: who sends there, if that is known.
+      worker: the node that sends there, if it is known.
       silent: how many of its firings were silent when it last sent.
     """
 
@@ -64,11 +64,11 @@ class _Looker:
 
 
 class Recorder(Listener):
-    """Everything of one recording that is done on the loop of the run.
+    """The part of one recording that runs on the loop of the run.
 
     Attributes:
-      held_s: how long nodes were held back all together.
-      times_held: how often.
+      held_s: how long nodes had to wait in total.
+      times_held: how often they had to.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class Recorder(Listener):
         self._bytes_put = 0
         self._mark = _WAKE_AFTER
         self._full = False
-        self._left_out = False  # and nothing has been put since
+        self._left_out = False  # and nothing was queued since
         self._held: list[RunningNode] = []
         self._held_since: float | None = None
         self._room = threading.Event()
@@ -95,15 +95,15 @@ class Recorder(Listener):
 
     @property
     def thread_waits_for(self) -> Callable[[], None]:
-        """What the thread calls when it has taken something."""
+        """The function that the thread calls after taking something."""
         return self._taken
 
     def now(self) -> float:
-        """On the run's clock."""
+        """Return seconds on the run's clock."""
         return self._engine.now()
 
     def look_at(self, what: Any, place: TokenWriter) -> None:
-        """Record what passes there from now on.
+        """Record the tokens that pass there from now on.
 
         Raises:
           UsageError: nothing passes there.
@@ -115,7 +115,7 @@ class Recorder(Listener):
             put = partial(self._signal, looker, put)
         elif getattr(getattr(what, "node", None), "_type", _NO_SOURCE).is_source:
             put = partial(self._output_of_source, looker, put)
-        # (what leaves a fused region's source in a wave is as plain as what leaves the others: no circumstances)
+        # (tokens that leave a fused region's source in a wave are plain, like all others there: no circumstances)
         looker.put = put if place.keep is not None else BatchTap.of(put, place, self._put_wave)
         self._lookers[looker] = self._taps.look(what, looker)
         self._find_sender(looker)
@@ -125,30 +125,30 @@ class Recorder(Listener):
         looker.worker = workers[0] if len(workers) == 1 else None
         looker.silent = 0 if looker.worker is None else looker.worker.counts.silent
 
-    # --- what the tokens themselves do not say ------------------------------------------------------------------------
+    # --- circumstances that tokens do not show ------------------------------------------------------------------------
 
     def _signal(self, looker: _Looker, put: Callable[[Token[Any]], None], token: Token[Any]) -> None:
-        """A signal leaves; mostly in a firing, which one of the tokens that follow will close."""
+        """A signal leaves, in most cases in a firing, whose last token is still to come."""
         worker: Any = looker.worker
         if worker is not None:
             amid, began = worker.busy, worker.stamp
             if amid == "ending" or (amid == "firing" and worker.blocked & ENDED):
                 token = _told(token, last=True)
             elif amid != "firing":
-                called = amid == "call" or (not amid and began is not None)  # the fast path of calls says no more
+                called = amid == "call" or (not amid and began is not None)  # the fast path of calls shows no more
                 token = _told(token, call=worker.counts.calls) if called else _told(token, beside=True)
             elif worker.is_source and began is not None and (began != token.stamp or _waited(worker)):
                 token = _told(token, began=None if began == token.stamp else began, waited=_waited(worker))
         put(token)
 
     def _output_of_source(self, looker: _Looker, put: Callable[[Token[Any]], None], token: Token[Any]) -> None:
-        """What a source has written leaves."""
+        """A token that a source has written leaves."""
         worker: Any = looker.worker
         if worker is None:
             put(token)
             return
-        if token.value is END:  # which may have had to wait until the outputs were free
-            put(_told(token, waited=True) if worker.busy == "over" and _waited(worker) else token)
+        if token.value is END:  # which may have waited until the outputs were free
+            put(_told(token, waited=True) if worker.busy == "releasing" and _waited(worker) else token)
             return
         began = token.stamp if worker.stamp is None else worker.stamp
         last, silent = bool(worker.blocked & ENDED), worker.counts.silent != looker.silent
@@ -161,7 +161,7 @@ class Recorder(Listener):
             put(token)
 
     def _put_wave(self, items: tuple[Any, ...]) -> None:
-        """What has passed in a wave of a fused region."""
+        """Queue the values of a wave of a fused region."""
         if self._full:
             for place in items[::ITEM]:
                 self._leave_out(place)
@@ -179,7 +179,7 @@ class Recorder(Listener):
             self._items.extend((None, TokensLeftOut(now), 0.0, 0, now))
 
     def _look(self, place: TokenWriter, *, answers: bool) -> Callable[[Token[Any]], None]:
-        """Make what is called with each token; `answers`: each is a firing's, so silence stands in for one refused."""
+        """Make the tap; `answers`: each token is a firing's, so silence replaces one that cannot be recorded."""
         extend, items, sizes = self._items.extend, self._items, self._thread.sizes
         now = self._engine.now
         real = self._engine.time.epoch is not None
@@ -224,7 +224,7 @@ class Recorder(Listener):
             return keep_and_put
         return put if self._lossless else put_if_there_is_room
 
-    # --- where the thread is behind -----------------------------------------------------------------------------------
+    # --- if the thread is behind --------------------------------------------------------------------------------------
 
     def _is_full(self) -> bool:
         return len(self._items) > ITEM * MOST_ITEMS or self._bytes_put - self._thread.bytes_taken > MOST_BYTES
@@ -235,10 +235,10 @@ class Recorder(Listener):
         )
 
     def _crowded(self) -> None:
-        """Much lies before the thread."""
+        """Much waits for the thread."""
         self._mark = len(self._items) + _WAKE_AFTER
         if not self._thread.is_alive():
-            self._items.clear()  # it has failed, and says so
+            self._items.clear()  # it has failed, and reports that itself
             return
         self._thread.wake()
         if not self._is_full() or self._held or not self._open:
@@ -250,11 +250,11 @@ class Recorder(Listener):
             self._wait()
         else:
             self._held = [*dict.fromkeys(one for looker in self._lookers for one in self._taps.workers(looker))]
-            self._engine.core.flags.append("recorder")  # the slice of the pump is over by that
+            self._engine.core.flags.append("recorder")  # which ends the slice of the pump
             self._engine.soon(self._hold)
 
     def _wait(self) -> None:
-        """In virtual time: let the loop wait, and nothing is another by that."""
+        """Let the loop wait, which changes no result in virtual time."""
         began = monotonic()
         while self._thread.is_alive() and not self._has_room():
             self._room.wait(0.1)
@@ -262,12 +262,12 @@ class Recorder(Listener):
         self._note_held(monotonic() - began)
 
     def _hold(self) -> None:
-        """Let those whose ports are recorded start nothing new."""
+        """Let the nodes whose ports are recorded start nothing new."""
         core = self._engine.core
         if core.over or self._held_since is not None:
             return
         self._held_since = monotonic()
-        core.begin_async()  # the run is not quiet meanwhile
+        core.begin_async()  # so that the run is not quiet meanwhile
         for worker in self._held:
             worker.block(RECORDED)
         if not self.times_held:
@@ -278,7 +278,7 @@ class Recorder(Listener):
         self._taken()
 
     def _taken(self) -> None:
-        """From the thread: it has taken something."""
+        """Called by the thread when it has taken something."""
         self._mark = _WAKE_AFTER
         if self._full and self._has_room():
             self._full = self._left_out = False
@@ -303,7 +303,7 @@ class Recorder(Listener):
         self.held_s += seconds
         self.times_held += 1
 
-    # --- what else is recorded, and the end ---------------------------------------------------------------------------
+    # --- other events, and the end ------------------------------------------------------------------------------------
 
     def _seldom_event(self, event: TraceEvent) -> None:
         self._items.extend((None, event, 0.0, 0, event.time))
@@ -317,7 +317,7 @@ class Recorder(Listener):
             self.on_structure()
 
     def stop(self) -> None:
-        """TokenTap at nothing any more; what lies before the thread is still written. Does nothing the second time."""
+        """Observe nothing any more; tokens that wait for the thread are still written. Does nothing the second time."""
         if not self._open:
             return
         for remove in self._lookers.values():
@@ -328,19 +328,19 @@ class Recorder(Listener):
         self._thread.finish()
 
     async def end(self) -> None:
-        """The run is over: the file is whole when this returns."""
+        """The run is over: the file is complete when this returns."""
         self.stop()
         await self.written()
 
     async def written(self) -> None:
-        """Wait until all is written; however long that takes, other tasks go on."""
+        """Wait until all is written, while other tasks continue."""
         while self._thread.is_alive():
             self._thread.join(_JOIN_S)
             await asyncio.sleep(0)
 
 
 def _waited(worker: RunningNode) -> bool:
-    """Whether the firing that is over has waited: an async one that has not is over in its turn."""
+    """Return whether the firing that has ended had waited: otherwise it ends in its turn."""
     return worker.is_async and not worker.core.pumping
 
 

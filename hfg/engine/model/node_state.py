@@ -222,9 +222,9 @@ class NodeState(Vertex[NodeT], Record):
         self.execution.end_limit()
         self.ticket += 1
 
-    def mark_special(self) -> None:
-        """Its next firing is not a plain one: a marker is on an input."""
-        self.special = True
+    def mark_special(self, special: bool = True) -> None:
+        """Set whether its next firing is not a plain one, because a marker is on an input."""
+        self.special = special
 
     # --- by a fast path (see `fusion`) --------------------------------------------------------------------------------
 
