@@ -585,11 +585,10 @@ class Run:
         Raises:
           UsageError: it is no node of this run.
         """
-        node = self._at(node)
         if node is None:
             inside = self._engine.core.workers
         else:
-            worker = self._engine.worker_of(node)
+            worker = self._engine.worker_of(self._at(node))
             inside = [worker] if worker.scope is None else worker.scope.inside()
         return {worker.path: explain(worker) for worker in inside if worker.node is not None and worker.scope is None}
 
