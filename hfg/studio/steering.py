@@ -108,8 +108,8 @@ class Steering:
         finally:
             self._ended(failure)
             self._task = None
-        if not begun.done():
-            begun.set_exception(failure or Refused("state", "the run was stopped as it began"))
+            if not begun.done():
+                begun.set_exception(failure or Refused("state", "the run was stopped as it began"))
 
     def _begun(self, run: Run) -> None:
         self.run = run
@@ -137,7 +137,10 @@ class Steering:
         self._over.set()
 
     def stop(self) -> None:
-        """End the run normally."""
+        """End the run normally; one that is still setting up its nodes is given up."""
+        if self.run is None and self._task is not None:
+            self._task.cancel()
+            return
         run = self._need()
         self._say(state="stopping")
         if self._until_stopped is not None:
@@ -157,6 +160,8 @@ class Steering:
     # --- while it runs ---
 
     def _need(self) -> Run:
+        if self.run is None and self._task is not None:
+            raise Refused("state", "the graph is still setting up its nodes; wait, or stop it")
         if self.run is None:
             raise Refused("state", "the graph does not run; start it first")
         return self.run

@@ -49,6 +49,13 @@ class Count(hfg.Node):
         self.calls += 1
 
 
+class Endless(hfg.Node):
+    """Its setup does not end."""
+
+    async def setup(self) -> None:
+        await asyncio.Event().wait()
+
+
 class Ticking(hfg.Node):
     """Send a number whenever it is asked to; never by itself."""
 
@@ -434,6 +441,22 @@ def test_a_failure_names_the_node_and_offers_commands_that_may_help() -> None:
         disable = next(fix["message"] for fix in problem["fixes"] if fix["text"] == "Disable scaled")
         assert (await page.ask(**disable))["t"] == "ack"
         assert page.tables["nodes"]["scaled"]["enabled"] is False
+
+    live(main)
+
+
+def test_a_graph_whose_setup_does_not_end_can_be_stopped() -> None:
+    async def main() -> None:
+        graph = hfg.Graph()
+        graph.add(Endless(), name="endless")
+        page = Page(studio_of(graph)).join()
+        starting = asyncio.ensure_future(page.ask("start"))
+        await page.state("starting")
+        assert "setting up" in (await page.ask("pause"))["message"]
+        assert (await page.ask("stop"))["t"] == "ack"
+        assert (await starting)["message"] == "the run was stopped as it began"
+        assert (page.run["state"], page.run["outcome"]) == ("ended", "stopped")
+        assert (await page.edit({"do": "Remove", "path": "endless"}))["t"] == "ack"
 
     live(main)
 
