@@ -1,4 +1,4 @@
-"""What a codec consists of, and the codecs that are composed of others. Depends on types.
+"""The parts of a codec, and codecs that are composed of others. Depends on types.
 
 A value is *lowered* to its carrier, which msgspec writes, and *lifted* from it.
 """

@@ -94,7 +94,7 @@ def find_reference(reference: str) -> Any:
 
 
 def find_tagged(reference: str) -> Any:
-    """Find what a tag names, where nobody says what data may refer to; see `_Decoder.code`."""
+    """Find what a tag names, where the caller sets no limits to references; see `_Decoder.code`."""
     return find_reference(reference)
 
 

@@ -72,7 +72,7 @@ class _Kinds(NamedTuple):
     """How a part handles its edges to and from others, by label.
 
     Attributes:
-      portions: number of processed tokens after which their producer is told.
+      portions: number of processed tokens after which their producer gets an acknowledgement.
       lossy: edges that may lose tokens.
       drains: edges whose tokens do not inherit positions.
       by_number: incoming edges whose tokens are counted by their numbers, here and by the producer.
