@@ -1,4 +1,5 @@
 import { edit } from "../state/actions";
+import { nameOf } from "../state/paths";
 import { useStudio } from "../state/studio";
 import type { Data } from "../protocol/types";
 
@@ -41,8 +42,8 @@ export function Placement({ path }: { path: string }) {
       {gate && (
         <div className="par">
           <label>gate</label>
-          <span className="fld wide">
-            open while {gate.by} is active
+          <span className="gated" title={`works only while ${gate.by} is active`}>
+            {gate.by === path ? "itself" : nameOf(gate.by)}
             <button type="button" className="btn small" onClick={() => void edit([{ do: "Ungate", path }])}>
               Take it away
             </button>

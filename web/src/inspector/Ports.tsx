@@ -29,7 +29,7 @@ function PortRow({ port }: { port: PortRecord }) {
   useEffect(() => {
     const subscription = socket.subscribe("value", { path: port.path }, 4, (next) => {
       const one = next as Value;
-      if (value.current) value.current.textContent = one.kind === "none" ? "" : one.summary;
+      if (value.current) value.current.textContent = one.kind === "none" || one.kind === "marker" ? "" : one.summary;
       if (speed.current) speed.current.textContent = one.seen > 0 ? rate(one.rate_hz) : "never";
     });
     return subscription.end;

@@ -34,7 +34,7 @@ function heard(frame: ActivityFrame): void {
   for (const act of listeners) act(frame);
   const ways = waysOf(frame.moves);
   const calm = ways.length === 0 || still.matches || document.hidden;
-  const next = { since: frame.active, ways: ways.length > 0 ? new Set(ways) : studio().activity.ways };
+  const next = { since: frame.active, ways: ways.length > 0 ? lastWays(frame.moves) : studio().activity.ways };
   if (calm) {
     show(next);
     return;
@@ -63,3 +63,15 @@ function sentence(before: Readonly<Record<string, number>>, now: Record<string, 
 
 /** The edges over which activity came, as the studio says. */
 const waysOf = (moves: readonly Move[]): string[] => moves.flatMap(([, , on, , via]) => (on ? (via ?? []) : []));
+
+/** The last way of each level; older ones are orange no more. */
+const last = new Map<string, string[]>();
+
+function lastWays(moves: readonly Move[]): Set<string> {
+  const { edges } = studio().tables;
+  for (const [, , on, , via] of moves) {
+    if (!on || !via) continue;
+    for (const [level, ways] of Map.groupBy(via, (key) => edges[key]?.level ?? "")) last.set(level, ways);
+  }
+  return new Set([...last.values()].flat());
+}

@@ -50,7 +50,7 @@ export function NodeTypeDoc({ row, port }: { row: FoundRow; port: string }) {
               </div>
             ))}
           </dl>
-          {type.doc.length > type.summary.length + 1 && <p style={{ whiteSpace: "pre-wrap", marginTop: 8 }}>{type.doc.slice(type.summary.length).trim()}</p>}
+          {type.doc.length > type.summary.length + 1 && <p style={{ whiteSpace: "pre-wrap", marginTop: 8 }}>{(type.doc.startsWith(type.summary) ? type.doc.slice(type.summary.length) : type.doc).trim()}</p>}
         </>
       )}
     </>
