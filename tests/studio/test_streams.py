@@ -13,6 +13,7 @@ import pytest
 import hfg
 from hfg.base.token import Token
 from hfg.studio.records import EdgeRecord
+from hfg.studio.sampled_topics import _sample_of
 from hfg.studio.showing import image_frame, shown_value
 from hfg.studio.spans import Ways
 from hfg.studio.viewing import Subscription
@@ -205,6 +206,24 @@ def test_measures_are_packed_in_the_order_of_the_nodes() -> None:
         assert count[1] == 3  # bars
         assert all(seconds > 0 for seconds in count[9:12])
         assert not any(nobody)
+        await page.studio.close()
+
+    live(main)
+
+
+def test_a_node_of_another_process_has_the_measures_of_its_last_report() -> None:
+    async def main() -> None:
+        graph = ticking()
+        page = Page(studio_of(graph)).join()
+        await page.ask("start", stay=True)
+        await page.ask("trigger", path="clock.tick", value=1)
+        run = page.studio.steering.run
+        assert run is not None
+        await run.wait_quiet()
+        known = run.statistics().nodes["count"]
+        sample = _sample_of(known)
+        assert (sample.done, sample.doing, sample.active) == (1, known.doing, False)
+        assert sample.newest_s == known.busy.last_s
         await page.studio.close()
 
     live(main)
