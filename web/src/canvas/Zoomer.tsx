@@ -1,6 +1,7 @@
 import { MiniMap, useReactFlow } from "@xyflow/react";
+import { useMemo } from "react";
 import { arrange } from "../state/actions";
-import { studio } from "../state/studio";
+import { studio, useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
 import type { HfgNode } from "./NodeView";
 
@@ -29,15 +30,18 @@ export function Zoomer({ zoom, showAll }: { zoom: number; showAll: () => void })
 
 const GROUP_COLOURS = ["var(--line2)", "var(--g1)", "var(--g2)", "var(--g3)", "var(--g4)"];
 
-function miniColour(node: HfgNode): string {
-  const { tables, activity } = studio();
+function miniColour(node: HfgNode, since: Readonly<Record<string, number>>): string {
+  const { tables } = studio();
   const path = node.id;
-  if (Object.keys(activity.since).some((one) => one === path || one.startsWith(`${path}/`))) return "var(--on)";
+  if (Object.keys(since).some((one) => one === path || one.startsWith(`${path}/`))) return "var(--on)";
   if (tables.studio.run?.error?.path.startsWith(path)) return "var(--bad)";
   const number = tables.groups[tables.nodes[path]?.group ?? ""]?.number ?? 0;
   return GROUP_COLOURS[number === 0 ? 0 : ((number - 1) % 4) + 1]!;
 }
 
+/** Its colours follow the activity. */
 export function Mini() {
-  return <MiniMap<HfgNode> className="mini" pannable zoomable nodeColor={miniColour} nodeBorderRadius={8} ariaLabel="Overview of this level" />;
+  const since = useStudio((s) => s.activity.since);
+  const colour = useMemo(() => (node: HfgNode) => miniColour(node, since), [since]);
+  return <MiniMap<HfgNode> className="mini" pannable zoomable nodeColor={colour} nodeBorderRadius={8} ariaLabel="Overview of this level" />;
 }

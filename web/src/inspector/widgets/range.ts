@@ -21,5 +21,5 @@ export function digits(value: number, step: number, whole: boolean): string {
   if (whole) return String(value);
   const places = Math.min(6, Math.max(1, -Math.floor(Math.log10(step))));
   const text = value.toFixed(places);
-  return Number(text) === value ? text : String(value);
+  return Number(text) === value ? text : String(+value.toPrecision(6));
 }
