@@ -3,7 +3,7 @@
 Allowed are hfg itself, packages that installed node types (entry points `hfg.nodes`), what the program has imported
 already, and what the caller allows; a module beside the file is not, as it came with the file. To be imported already
 does not make all that a module holds open to files: they name node types, operators and types of data, and other
-functions only of modules that the caller allows. Stands on the catalogue's offers.
+functions only of modules that the caller allows. Depends on the catalogue's offers.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _PLAIN: Final = (bool, int, float, complex, str, bytes, list, tuple, dict, set, 
 
 
 def project_of(file: Path) -> Path:
-    """Give the folder that a file's modules and included files lie in.
+    """Return the folder that a file's modules and included files lie in.
 
     The nearest one upwards with a pyproject.toml, else the file's own.
     """
@@ -44,7 +44,7 @@ def project_of(file: Path) -> Path:
 
 @functools.cache
 def installed_packages() -> tuple[str, ...]:
-    """Give the packages whose distributions say that they have node types."""
+    """Return the packages whose distributions say that they have node types."""
     from hfg.catalogue.offers import offers
 
     return tuple(sorted({offer.module.partition(".")[0] for offer in offers()}))
@@ -83,7 +83,7 @@ class Allowed:
         )
 
     def refusal(self, module: str) -> str | None:
-        """Say why a module must not be imported, with the remedy; None if it may be."""
+        """Return why a module must not be imported, with the remedy; None if it may be."""
         self._asked.add(module)
         if module in sys.modules:
             return None
@@ -115,7 +115,7 @@ class Allowed:
         )
 
     def refusal_of_value(self, reference: str, found: object) -> str | None:
-        """Say why a value must not be what a reference stands for, though its module may be imported."""
+        """Return why a value must not be what a reference stands for, though its module may be imported."""
         module = reference.partition(":")[0]
         if isinstance(found, NodeFunction | OperatorFunction) or _is_declared(found):
             return None
@@ -132,14 +132,14 @@ class Allowed:
         )
 
     def refusal_of_reference(self, reference: str) -> str | None:
-        """Say why what is named must not be looked for."""
+        """Return why what is named must not be looked for."""
         module, colon, name = reference.partition(":")
         if module == boxes.__name__ and name.startswith("File["):
             return f'"{reference:.80}" stands for another file; include that, with file: below the node'
         return self.refusal(module) if colon else None
 
     def refusal_of_type(self, text: str) -> str | None:
-        """Say the same of the modules that a type written as a text names."""
+        """Return the same of the modules that a type written as a text names."""
         return next((why for module in _modules_in(text) if (why := self.refusal(module)) is not None), None)
 
     def _folder_of(self, top: str) -> Path | None:
@@ -152,7 +152,7 @@ class Allowed:
 
 
 def _is_declared(found: object) -> bool:
-    """Whether that is a class of nodes or of data, which a file may name."""
+    """Return whether that is a class of nodes or of data, which a file may name."""
     return isinstance(found, type) and (found in _PLAIN or issubclass(found, Node) or is_data_type(found))
 
 
@@ -194,5 +194,5 @@ def _modules_in(text: str) -> Iterator[str]:
 
 
 def _has(module: str, parts: list[str]) -> bool:
-    """Whether a module that is imported has what a type names, so that no other is imported to look for it."""
+    """Return whether a module that is imported has what a type names, so that no other is imported to look for it."""
     return look_up(module, ".".join(parts[module.count(".") + 1 :])) is not None

@@ -146,7 +146,7 @@ class _Loading:
     # --- included files ---
 
     def parts(self, read: Read, path: Path, around: list[Path]) -> dict[str, type[FileBox]]:
-        """Give the types of the files that a document includes, by how it names them."""
+        """Return the types of the files that a document includes, by how it names them."""
         found: dict[str, type[FileBox]] = {}
         for key, node in _nodes(read.document, ()):
             if not node.file or node.file in found:
@@ -164,7 +164,7 @@ class _Loading:
         return self.box((path.parent / named).resolve(), str(Path(read.file).parent / named), around)
 
     def refusal_of_part(self, named: str, path: Path, around: list[Path]) -> str | None:
-        """Say why a file cannot be included; None if it may be."""
+        """Return why a file cannot be included; None if it may be."""
         try:
             other = (path.parent / named).resolve()
         except (OSError, ValueError, RuntimeError) as error:
@@ -182,7 +182,7 @@ class _Loading:
         return None
 
     def box(self, path: Path, file: str, around: list[Path]) -> type[FileBox] | None:
-        """Give the type of the subgraphs that a file describes; None if it cannot be, which is reported."""
+        """Return the type of the subgraphs that a file describes; None if it cannot be, which is reported."""
         if path in self.types:
             return self.types[path]
         before = len(self.findings.problems)
@@ -204,7 +204,7 @@ class _Loading:
     # --- what may be imported ---
 
     def find(self, reference: str) -> Any:
-        """Give what a value refers to by "module:name".
+        """Return what a value refers to by "module:name".
 
         Raises:
           GraphError: it must not be imported, or is no value for a file to have.
@@ -257,7 +257,7 @@ def _nodes(box: BoxDocument, key: Key) -> Iterator[tuple[Key, NodeDocument]]:
 
 
 def modules_of(document: Document) -> dict[str, str]:
-    """Give the modules that a graph needs for its nodes and operators, each with the first place that does."""
+    """Return the modules that a graph needs for its nodes and operators, each with the first place that does."""
     found: dict[str, str] = {}
     for key, text, is_type in _references(document, ()):
         if not is_type:

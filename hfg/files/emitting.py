@@ -116,12 +116,12 @@ def _text(text: str) -> str:
 
 
 def _looks_otherwise(text: str) -> bool:
-    """Whether some reader takes it for a number, a truth value or the end of a document."""
+    """Return whether some reader takes it for a number, a truth value or the end of a document."""
     return bool(_WORDS.fullmatch(text) or _NUMBER.fullmatch(text)) or text.startswith("...")
 
 
 def _is_block(text: str) -> bool:
-    """Whether a text of several lines can stand as it is, below its key."""
+    """Return whether a text of several lines can stand as it is, below its key."""
     if "\n" not in text or text[0] in " \n" or not _BLOCK.fullmatch(text):
         return False
     lines = text.split("\n")

@@ -55,7 +55,7 @@ def save(graph: Graph, path: str | os.PathLike[str]) -> None:
 
 
 def describe(graph: Graph, *, beside: str | os.PathLike[str] | None = None) -> Document:
-    """Give what a file would say about a graph, as plain data.
+    """Return what a file would say about a graph, as plain data.
 
     Args:
       graph: a whole graph.
@@ -105,7 +105,7 @@ def read(path: str | os.PathLike[str]) -> Document:
 
 
 def text_of(document: Document) -> str:
-    """Give the text of a file that says this.
+    """Return the text of a file that says this.
 
     Raises:
       FileError: a text cannot be read back as it is.
@@ -142,7 +142,7 @@ def write(document: Document, path: str | os.PathLike[str]) -> None:
 
 
 def schema(*, types: bool = False, allow: Iterable[str] = ()) -> str:
-    """Give the JSON schema of graph files, as text.
+    """Return the JSON schema of graph files, as text.
 
     Args:
       types: whether it knows the installed node types with their parameters: editors complete and check these then.

@@ -1,4 +1,4 @@
-"""Collects what is wrong with a graph file: each finding with file, line and path in the graph. Stands on errors."""
+"""Collects what is wrong with a graph file: each finding with file, line and path in the graph. Depends on errors."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def split(sentence: str) -> tuple[str, str]:
 
 
 def graph_path(key: Key, edges: Any = None) -> str:
-    """Give the path in the graph of what stands at a key of a document; "" for the whole.
+    """Return the path in the graph of what stands at a key of a document; "" for the whole.
 
     Args:
       key: where.

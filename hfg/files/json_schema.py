@@ -28,12 +28,12 @@ _LABEL: Final = {
 
 
 def schema_text(schema: dict[str, Any]) -> str:
-    """Give it as text."""
+    """Return it as text."""
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
 def json_schema() -> dict[str, Any]:
-    """Give it as data."""
+    """Return it as data."""
     (top,), components = msgspec.json.schema_components([Document], ref_template="#/$defs/{name}")
     for name, component in components.items():
         _describe(getattr(document, name), component)

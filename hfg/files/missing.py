@@ -1,7 +1,7 @@
 """Stands in for a node whose type is not there: it keeps its place, its edges and all that the file says about it.
 
 So a graph can be looked at, edited and saved without its package, and nothing is lost; the check reports an error, so
-it does not run. Stands on nodes and on what can be added to the checks.
+it does not run. Depends on nodes and on what can be added to the checks.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Gives the text of a file that somebody has named, or a finding why there is none.
 
-Files of every kind that hold graphs are opened here, so that all are refused in the same words. Stands on `findings`
+Files of every kind that hold graphs are opened here, so that all are refused in the same words. Depends on `findings`
 and bounds.
 """
 

@@ -2,7 +2,7 @@
 
 Every mapping, list and scalar becomes a `Located`. Tags, which could name Python objects, second documents, keys that
 come twice and aliases that explode are findings. The words are those of YAML 1.2: `no` and `on` are texts, 010 is ten.
-Stands on PyYAML, of which it takes the events alone.
+Depends on PyYAML, of which it takes the events alone.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def parse(text: str, report: Report) -> Located | None:
 
 
 def plain(located: Located) -> Any:
-    """Give the value without its lines."""
+    """Return the value without its lines."""
     value = located.value
     if isinstance(value, dict):
         return {key: plain(one) for key, one in value.items()}

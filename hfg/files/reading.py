@@ -1,7 +1,7 @@
 """Makes a document of the text of a graph file, and finds everything that is wrong with its shape at once.
 
 What a document may hold is read from its structs. Whoever builds a graph of it later finds the lines in `Read.lines`.
-Stands on `opening`, `parsing` and `document`.
+Depends on `opening`, `parsing` and `document`.
 """
 
 from __future__ import annotations
@@ -233,7 +233,7 @@ class _Reading:
         return read
 
     def is_one(self, found: Located, node: NodeDocument, key: Key, known: bool) -> bool:
-        """Whether a node says what it is, and says it once; a word that is not known may have been meant so."""
+        """Return whether a node says what it is, and says it once; a word that is not known may have been meant so."""
         if not (node.type or node.file or node.graph is not None):
             told = any(found.value[name].value not in (None, "") for name in _SAYS if name in found.value)
             if known and not told:

@@ -1,6 +1,6 @@
 """Node types in the JSON schema of graph files, so that editors complete types and parameters and check values.
 
-A type that is not listed is any text, and its parameters are not checked. Stands on the catalogue's descriptions.
+A type that is not listed is any text, and its parameters are not checked. Depends on the catalogue's descriptions.
 """
 
 from __future__ import annotations

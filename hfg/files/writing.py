@@ -1,4 +1,4 @@
-"""Writes a document as text, and text into a file: whole or not at all. Stands on `emitting` and `document`."""
+"""Writes a document as text, and text into a file: whole or not at all. Depends on `emitting` and `document`."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@
     flat        one graph without subgraphs, as a runner and the checks see it
     structure   what a graph is made of: nodes, edges, groups, gates, subgraphs, the ports of the whole
 
-Each wing has a map of its own, and imports only those below it; a test keeps that. Stands on node types and ports.
+Each wing has a map of its own, and imports only those below it; a test keeps that. Depends on node types and ports.
 """
 
 from hfg.graph.editing import commands

@@ -383,12 +383,12 @@ class Graph:
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is an edit to undo. The last 1,000 edits are kept."""
+        """Return whether there is an edit to undo. The last 1,000 edits are kept."""
         return bool(self._level.whole.history.done)
 
     @property
     def can_redo(self) -> bool:
-        """Whether the last change was an undo, so that its edit can be carried out again."""
+        """Return whether the last change was an undo, so that its edit can be carried out again."""
         return bool(self._level.whole.history.undone)
 
     @property
@@ -474,7 +474,7 @@ class Graph:
         return Place(self, self.name, "")
 
     def _is_taken(self, port: Port) -> bool:
-        """Whether it is an input that has its edge; asked by `>>`."""
+        """Return whether it is an input that has its edge; asked by `>>`."""
         return port in self._level.connections.into
 
     @property

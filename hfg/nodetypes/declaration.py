@@ -302,11 +302,7 @@ def _slots_spec(slots: Slots[Any], where: str, is_subgraph: bool) -> SlotSpec:
 
 
 def _behind_self(function: Callable[..., Any], what: str, where: str) -> list[inspect.Parameter]:
-    """Return the arguments of a method after the node itself.
-
-    Raises:
-      DeclarationError: the first argument cannot be the node.
-    """
+    """Return the arguments of a method after the node itself."""
     arguments = list(inspect.signature(function).parameters.values())
     first = arguments[0] if arguments else None
     if first is None or first.kind is first.KEYWORD_ONLY or _is_annotated(first):

@@ -272,11 +272,7 @@ def make_type(
 
 
 def _declared_vectors(where: str, inputs: Mapping[str, Any] | None, outputs: Any) -> dict[str, Vector[Any]]:
-    """Return the vectors that the call declares, each under its name.
-
-    Raises:
-      DeclarationError: an input and an output share a name, or a vector is of the other kind.
-    """
+    """Return the vectors that the call declares, each under its name."""
     found: dict[str, Vector[Any]] = {}
     for word, kind, given in (("inputs", Inputs, inputs), ("outputs", Outputs, outputs)):
         for name, vector in given.items() if isinstance(given, Mapping) else ():

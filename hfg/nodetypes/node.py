@@ -410,11 +410,7 @@ class Node:
         return getattr(self, name) if name in self._type.hooks else None
 
     def _split(self, result: Any) -> list[Any]:
-        """Split the result of the process function into one value per output, in order of declaration.
-
-        Raises:
-          TypeError: the result does not match the outputs.
-        """
+        """Split the result of the process function into one value per output, in order of declaration."""
         type_ = self._type
         if type_.result == "single":
             return [result]
@@ -473,9 +469,6 @@ class Node:
           name: name of the parameter.
           value: the new value; a list, a set, a dict or an array is copied.
           own: the call comes from the node's code, which is the only one to set read-only parameters.
-
-        Raises:
-          ValueError: the value violates the limits, or only the node may set the parameter.
         """
         spec = self._type.parameters.get(name)
         if spec is None or spec.trigger:
@@ -527,21 +520,13 @@ class Node:
         return type(self)(**{name: value for name, value in self._parameters.items() if specs[name].is_given})
 
     def _free_source(self) -> Source[Any]:
-        """Find the only port that sends.
-
-        Raises:
-          UsageError: there is none, or more than one.
-        """
+        """Find the only port that sends."""
         candidates = [*self.ports.outputs.values(), *self.ports.events.values()]
         source: Source[Any] = _only(self, candidates, "output or event")
         return source
 
     def _free_target(self) -> Target[Any]:
-        """Find the only port that receives and is free: inputs without an edge, and slots.
-
-        Raises:
-          UsageError: there is none, or more than one.
-        """
+        """Find the only port that receives and is free: inputs without an edge, and slots."""
         candidates = [*self.ports.inputs.values(), *self.ports.slots.values()]
         if len(candidates) > 1 and self._place is not None:
             is_taken = self._place.graph._is_taken

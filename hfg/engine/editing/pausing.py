@@ -272,11 +272,7 @@ class Pausing:
         return found
 
     def _at_edges_of(self, place: Any, when: Callable[[Token[Any]], object] | None) -> Breakpoint:
-        """Pause when a token is put on one of the edges, before a node takes it.
-
-        Raises:
-          UsageError: there is no edge.
-        """
+        """Pause when a token is put on one of the edges, before a node takes it."""
         labels = self._labels(place)
         if not labels:
             raise UsageError(f"{place!r} has no edge in this run, so no token can come there")

@@ -1,7 +1,7 @@
 """Makes a document of a graph file of what a file of CS::APEX says, and tells what became of each part.
 
 First names and rules of all nodes, then which way ports are counted, for that needs all connections; then nodes and
-edges. What this finds nothing for keeps its place with its data. Stands on `document`, `table`, `ports` and `report`.
+edges. What this finds nothing for keeps its place with its data. Depends on `document`, `table`, `ports` and `report`.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ class _Converting:
                 self.level(node.graph, inner.graph, f"{path}{level.names[uuid]}/", node)
 
     def counts_automatic(self, level: _Level) -> bool:
-        """Whether a number here is too large for a node unless automatic ports are counted.
+        """Return whether a number here is too large for a node unless automatic ports are counted.
 
         Subgraphs are no evidence: their ports have been counted behind the automatic ones for longer.
         """
@@ -438,12 +438,7 @@ class _Converting:
 
 
 def _set(parameters: dict[str, Any], goes: ParameterRule, said: ApexParameter) -> None:
-    """Set a parameter.
-
-    Raises:
-      TypeError: there is nothing for the value.
-      ValueError: the same.
-    """
+    """Set a parameter."""
     value = _meant(goes, said)
     match goes.how:
         case "same":

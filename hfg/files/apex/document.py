@@ -1,4 +1,4 @@
-"""What a file of CS::APEX says, as plain data. Stands on nothing."""
+"""What a file of CS::APEX says, as plain data. Depends on nothing."""
 
 from __future__ import annotations
 

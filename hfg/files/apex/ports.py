@@ -101,5 +101,5 @@ def parts(port: str) -> tuple[str, str]:
 
 
 def is_source(kind: str) -> bool:
-    """Whether connections begin there."""
+    """Return whether connections begin there."""
     return kind in _SOURCES

@@ -1,7 +1,7 @@
 """Builds what was converted, so that the report is about a graph that there is, not one that might be.
 
 What is refused, a value beyond a limit or an edge between types that do not fit, becomes a part of the report and goes
-to the notes. Stands on `building` and `report`.
+to the notes. Depends on `building` and `report`.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def _give_signals_values(document: Document, report: ConversionReport, graph: Gr
 
 
 def _is_bare(graph: Graph, prefix: str, edge: EdgeDocument) -> bool:
-    """Whether a signal without a value goes into an input."""
+    """Return whether a signal without a value goes into an input."""
     name, _, port = edge.source.rpartition(".")
     target, _, into = edge.target.rpartition(".")
     if not target:

@@ -1,7 +1,7 @@
 """Reads a file of CS::APEX, `*.apex`, or a snippet, `*.apexs`, and finds everything that is wrong with its shape.
 
 Keys may come in any order and most may be missing; what a version before or after writes more is kept and not refused.
-Stands on the opening and parsing of graph files and on `document`.
+Depends on the opening and parsing of graph files and on `document`.
 """
 
 from __future__ import annotations

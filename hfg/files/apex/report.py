@@ -1,4 +1,4 @@
-"""What became of the parts of a file of CS::APEX. Stands on nothing."""
+"""What became of the parts of a file of CS::APEX. Depends on nothing."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class ConversionReport(msgspec.Struct):
     remarks: list[str] = []
 
     def count(self, state: State) -> tuple[int, int]:
-        """Give how many nodes and connections are so."""
+        """Return how many nodes and connections are so."""
         return (
             sum(one.state == state for one in self.nodes),
             sum(one.state == state for one in self.connections),

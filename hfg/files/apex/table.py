@@ -1,6 +1,6 @@
 """The types of CS::APEX and what they are here, as data from `types.yaml`.
 
-A plug-in's own type of the same class name but another namespace is none of these. Stands on msgspec.
+A plug-in's own type of the same class name but another namespace is none of these. Depends on msgspec.
 """
 
 from __future__ import annotations
@@ -63,12 +63,12 @@ class TypeRule(msgspec.Struct, forbid_unknown_fields=True):
     differs: str = ""
 
     def parameter(self, name: str) -> ParameterRule | None:
-        """Say where a parameter goes."""
+        """Return where a parameter goes."""
         found = self.parameters.get(name)
         return ParameterRule(found) if isinstance(found, str) else found
 
     def output_of(self, name: str) -> str | None:
-        """Say which output a parameter is that shows what has come."""
+        """Return which output a parameter is that shows what has come."""
         for pattern, output in self.shown.items():
             before, _, behind = pattern.partition("{}")
             number = name.removeprefix(before).removesuffix(behind) if "{}" in pattern else ""
@@ -79,13 +79,13 @@ class TypeRule(msgspec.Struct, forbid_unknown_fields=True):
 
 @cache
 def rules() -> dict[str, TypeRule]:
-    """Give what is known of all types, by their names behind the namespaces of CS::APEX."""
+    """Return what is known of all types, by their names behind the namespaces of CS::APEX."""
     text = files(__package__).joinpath("types.yaml").read_text(encoding="utf-8")
     return msgspec.convert(yaml.safe_load(text), dict[str, TypeRule])
 
 
 def rule_of(kind: str) -> TypeRule | None:
-    """Give what is known of a type, named as in a file; None if that is nothing."""
+    """Return what is known of a type, named as in a file; None if that is nothing."""
     for namespace in sorted(_NAMESPACES, key=len, reverse=True):
         if kind.startswith(namespace):
             return rules().get(kind.removeprefix(namespace))

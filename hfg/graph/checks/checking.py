@@ -1,7 +1,7 @@
 """What only the whole shows: every check is a function over the flat graph that gives what it finds.
 
 An error keeps the graph from running as its structure says; warnings and hints are told and the graph runs. Floors
-above add their own with `also`. Stands on `flat`, `edges`, `flow` and `nodes`.
+above add their own with `also`. Depends on `flat`, `edges`, `flow` and `nodes`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Checks of what the parts of an edge through subgraphs make together, and of the borders of what iterates (P2-P7, G).
 
-Stands on `flat`.
+Depends on `flat`.
 """
 
 from __future__ import annotations
@@ -30,38 +30,43 @@ def joined_edges(flat: FlatGraph) -> Iterator[Problem]:
             first = into.setdefault(edge.target, edge)
         if first is not edge:
             yield _doubled(first, edge)
-        if len(edge.segments) == 1:
-            continue
-        yield from _mismatch(edge)
-        said = next((part for part in edge.segments if part.options.first_said("events")), None)
-        if said is not None and not edge.is_event_edge:
-            yield Problem(
-                path=edge.label,
-                severity="error",
-                what=f"{said.options.first_said('events')} is said on {said.label}, a part of it",
-                why="it comes from an output, and such an edge holds one token and no queue (rule P4)",
-                remedy="leave it out, or send by an event",
-                check="queue-on-data",
-            )
-        buffered = next((part for part in edge.segments if part.options.buffer), None)
-        if buffered is not None and (edge.is_event_edge or kind == "slot"):
-            yield Problem(
-                path=edge.label,
-                severity="error",
-                what=f"buffer={buffered.options.buffer} is said on {buffered.label}, a part of it",
-                why="it leads into a slot or comes from an event, and a buffer is for data into an input (rule P4)",
-                remedy="leave it out, or send by an event and say capacity=",
-                check="buffer-without-join",
-            )
-        if edge.options.initial and (kind == "slot" or (kind == "parameter" and edge.is_event_edge)):
-            yield Problem(
-                path=edge.label,
-                severity="error",
-                what="initial tokens lie on a part of it",
-                why="initial tokens are for edges into inputs (rule P7)",
-                remedy="leave out initial=[...], or connect to an input",
-                check="initial-before-slot",
-            )
+        if len(edge.segments) > 1:
+            yield from _mismatch(edge)
+            yield from _options_of_parts(edge)
+
+
+def _options_of_parts(edge: FlatEdge) -> Iterator[Problem]:
+    """Options of a part that the whole edge cannot have."""
+    kind = edge.target.kind
+    said = next((part for part in edge.segments if part.options.first_said("events")), None)
+    if said is not None and not edge.is_event_edge:
+        yield Problem(
+            path=edge.label,
+            severity="error",
+            what=f"{said.options.first_said('events')} is said on {said.label}, a part of it",
+            why="it comes from an output, and such an edge holds one token and no queue (rule P4)",
+            remedy="leave it out, or send by an event",
+            check="queue-on-data",
+        )
+    buffered = next((part for part in edge.segments if part.options.buffer), None)
+    if buffered is not None and (edge.is_event_edge or kind == "slot"):
+        yield Problem(
+            path=edge.label,
+            severity="error",
+            what=f"buffer={buffered.options.buffer} is said on {buffered.label}, a part of it",
+            why="it leads into a slot or comes from an event, and a buffer is for data into an input (rule P4)",
+            remedy="leave it out, or send by an event and say capacity=",
+            check="buffer-without-join",
+        )
+    if edge.options.initial and (kind == "slot" or (kind == "parameter" and edge.is_event_edge)):
+        yield Problem(
+            path=edge.label,
+            severity="error",
+            what="initial tokens lie on a part of it",
+            why="initial tokens are for edges into inputs (rule P7)",
+            remedy="leave out initial=[...], or connect to an input",
+            check="initial-before-slot",
+        )
 
 
 def _mismatch(edge: FlatEdge) -> Iterator[Problem]:

@@ -2,7 +2,7 @@
 
 Only what is certain counts. A type is judged by the text of its process function: it may compute, write and trigger,
 and must not call, raise or import anything else. A source is left alone as soon as something behind it may take its
-time, for then its outputs or full queues hold it back, or may end the run. Stands on `flat`.
+time, for then its outputs or full queues hold it back, or may end the run. Depends on `flat`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _HARMLESS_CODE: Final = (
 
 
 def endless(flat: FlatGraph, *, virtual: bool = False) -> Iterator[FlatNode]:
-    """Give the sources that hold the run at one instant for ever.
+    """Yield the sources that hold the run at one instant for ever.
 
     Args:
       flat: where they are.
@@ -99,7 +99,7 @@ def _takes_time(flat: FlatGraph, node: FlatNode, *, virtual: bool) -> bool:
 
 @functools.lru_cache(maxsize=1024)
 def runs_for_ever(kind: NodeType) -> bool:
-    """Say whether a source of this type certainly never ends and never waits by itself; when in doubt it may."""
+    """Return whether a source of this type certainly never ends and never waits by itself; when in doubt it may."""
     if not kind.is_source or kind.process_kind not in ("function", "generator") or "ready" in kind.hooks:
         return False
     declares = getattr(kind.origin, "function", None) if kind.is_function else vars(kind.origin).get("process")
@@ -136,7 +136,7 @@ class _Judge:
         self._locals = {argument.arg for argument in given} | {one.id for one in stored}
 
     def is_harmless(self) -> bool:
-        """Whether it can do nothing but compute, write and trigger."""
+        """Return whether it can do nothing but compute, write and trigger."""
         return all(self._allows(one) for line in self._code.body for one in ast.walk(line))
 
     def _allows(self, code: ast.AST) -> bool:

@@ -1,6 +1,6 @@
 """Checks of what flows: who waits for ever, what goes round, what never comes (rules F1, F2, F8, P7, A9).
 
-Stands on `flat` and `order`.
+Depends on `flat` and `order`.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def unconnected_graph(flat: FlatGraph) -> Iterator[Problem]:
 
 
 def never_fires(flat: FlatGraph) -> set[int]:
-    """Give the nodes that certainly never fire: without process function, or behind an unconnected input."""
+    """Return the nodes that certainly never fire: without process function, or behind an unconnected input."""
     silent = {node.index for node in flat.nodes if node.node._type.process_kind == "none" and node.iteration is None}
     lonely = _lonely_inputs(flat)
     if lonely:
@@ -283,7 +283,7 @@ def _may_trigger_often(flat: FlatGraph, edge: FlatEdge) -> bool:
 
 
 def _has_loop(code: CodeType) -> bool:
-    """Whether it jumps back, but for an await, which jumps itself, and in Python 3.12 behind its clean-up."""
+    """Return whether it jumps back, but for an await, which jumps itself, and in Python 3.12 behind its clean-up."""
     names = ["", *(instruction.opname for instruction in dis.get_instructions(code))]
     return any(
         "JUMP_BACKWARD" in name and not name.endswith("NO_INTERRUPT") and before != "CLEANUP_THROW"
@@ -372,7 +372,7 @@ def endless_sources(flat: FlatGraph) -> Iterator[Problem]:
 
 
 def _successors(flat: FlatGraph, edges: Iterable[FlatEdge]) -> list[list[int]]:
-    """Give the nodes that wait for each node; what holds an initial token, or leads into a slot, holds nobody up."""
+    """Return the nodes that wait for each node; what holds an initial token, or leads into a slot, holds nobody up."""
     successors: list[list[int]] = [[] for _ in flat.nodes]
     for edge in edges:
         source, target = edge.source.node, edge.target.node

@@ -1,6 +1,6 @@
 """Checks of nodes by themselves: groups, scheduling, and whether their types can be found again (rules R1, R2).
 
-Stands on `flat`.
+Depends on `flat`.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def unknown_groups(flat: FlatGraph) -> Iterator[Problem]:
 
 
 def _members(flat: FlatGraph) -> Iterator[tuple[str, Node, NodeOptions]]:
-    """Give path, node and options of nodes and dissolved subgraphs."""
+    """Yield path, node and options of nodes and dissolved subgraphs."""
     for item in flat.nodes:
         yield item.path, item.node, item.options
     for scope in flat.scopes:
@@ -101,7 +101,7 @@ def async_in_threads(flat: FlatGraph) -> Iterator[Problem]:
 
 
 def needs_loop(node: Node) -> str:
-    """Say why a node cannot be in a group that is a thread (rule R1); nothing if it can."""
+    """Return why a node cannot be in a group that is a thread (rule R1); nothing if it can."""
     kind = node._type
     if kind.process_kind.startswith("async"):
         return "it is async"
@@ -166,7 +166,7 @@ def _methods(cls: type) -> Iterator[str]:
 
 
 def functions_of(cls: type, *, until: type) -> Iterator[FunctionType]:
-    """Give the methods of a class and of its bases below another."""
+    """Yield the methods of a class and of its bases below another."""
     for one in cls.__mro__[: cls.__mro__.index(until)]:
         for value in vars(one).values():
             function = getattr(value, "handler", getattr(value, "__func__", value))
@@ -244,7 +244,7 @@ def _known_names(cls: type) -> set[str]:
 
 
 def codes_in(code: CodeType) -> Iterator[CodeType]:
-    """Give a function's code, and that of the functions and comprehensions inside."""
+    """Yield a function's code, and that of the functions and comprehensions inside."""
     yield code
     for constant in code.co_consts:
         if isinstance(constant, CodeType):

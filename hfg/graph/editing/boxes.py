@@ -203,11 +203,7 @@ def parameter_as_data(spec: ParameterSpec, type_: str, parameters: Mapping[str, 
 def _conditions_as_data(
     conditions: tuple[Condition, ...], parameters: Mapping[str, ParameterSpec]
 ) -> str | dict[str, Any] | None:
-    """Return conditions in the form of the declaration: a name, or by name what others must be.
-
-    Raises:
-      EncodingError: a value in them is not data.
-    """
+    """Return conditions in the form of the declaration: a name, or by name what others must be."""
     found: dict[str, Any] = {}
     for one in conditions:
         if one.on:

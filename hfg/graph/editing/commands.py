@@ -1,7 +1,7 @@
 """Edits of a graph as data: what is to change, by paths and references alone (rule R4).
 
 A command can be logged, sent over a wire and carried out again: `encode` and `decode`. It says what, never how:
-`performing` carries it out on a graph, `transactions` undoes it, and a run follows. Stands on errors.
+`performing` carries it out on a graph, `transactions` undoes it, and a run follows. Depends on errors.
 """
 
 from __future__ import annotations

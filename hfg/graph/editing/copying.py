@@ -1,4 +1,4 @@
-"""Copies of nodes; of a subgraph as it is now, not as its `build` would make it. Stands on levels."""
+"""Copies of nodes; of a subgraph as it is now, not as its `build` would make it. Depends on levels."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ End = TypeVar("End")
 
 
 def copy_of(node: Node, around: Level) -> tuple[Node, Level | None]:
-    """Give a node of the same type and parameters that is in no graph, and for a subgraph a copy of its inside."""
+    """Return a node of the same type and parameters that is in no graph, and for a subgraph a copy of its inside."""
     copies: dict[object, Node] = {}
     first = copies[node] = node._copy()
     set_options(first, node._options)  # by which an end of it shows whether it takes one edge alone
@@ -60,7 +60,7 @@ def _connect(old: Level, new: Level, copies: dict[object, Node]) -> None:
 
 
 def _end(end: End, copies: dict[object, Node]) -> End:
-    """Give what an end is among the copies; the whole graph's own ports, and observables, are what they are."""
+    """Return what an end is among the copies; the whole graph's own ports, and observables, are what they are."""
     found: Any = end
     if isinstance(end, InnerSource | InnerTarget):
         relay: Any = same_port(copies[end.outer.node], end.outer)

@@ -1,7 +1,7 @@
 """Grouping nodes into a subgraph and dissolving one, so that nobody else can tell (rule G1).
 
 Each edge over the border gets a port of its own, in order, so that what a node sends keeps its order. Stands on
-`changes`, `straight` and levels.
+`changes`, `queue_conflicts` and levels.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 from hfg.errors import GraphError
 from hfg.graph.editing.boxes import DECLARED, is_free
 from hfg.graph.editing.changes import Change, EdgeChange, GateChange, NodeChange, PromotionChange
-from hfg.graph.editing.straight import refuse_other_queues
+from hfg.graph.editing.queue_conflicts import refuse_other_queues
 from hfg.graph.structure.connecting import refuse
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of
 from hfg.graph.structure.joining import inner_part, joined, outer_part
@@ -129,7 +129,7 @@ class _Names:
             self.of[edge] = (name, kind, end.type)
 
     def port(self, edge: Edge, box: Box) -> Any:  # noqa: ANN401 - of the kind that the edge needs
-        """Give the bound port of an edge."""
+        """Return the bound port of an edge."""
         name, kind, _ = self.of[edge]
         return getattr(box.ports, f"{kind}s")[name]
 
@@ -220,11 +220,7 @@ def _let_out(do: Do, box: Node, around: Level, within: Level) -> None:
 
 
 def _need_dissolvable(box: Node, levels: Sequence[Level]) -> Level:
-    """Give what is inside a subgraph that can be dissolved.
-
-    Raises:
-      GraphError: it cannot.
-    """
+    """Return what is inside a subgraph that can be dissolved."""
     path, within = box.place.path, inside(box)
     if within is None:
         raise GraphError(f'"{path}" is no subgraph, so it cannot be dissolved; name a node that holds a graph')
@@ -278,18 +274,18 @@ class _Border:
         self.promotions = within.promotions
 
     def is_at(self, edge: Edge) -> bool:
-        """Say whether an edge begins or ends at a port of the subgraph."""
+        """Return whether an edge begins or ends at a port of the subgraph."""
         return _relay(edge.source, self.box) is not None or _relay(edge.target, self.box) is not None
 
     def outwards(self) -> Iterator[tuple[Edge, EdgeOptions]]:
-        """Give the edges inside that go on outside, and the options that hold there."""
+        """Yield the edges inside that go on outside, and the options that hold there."""
         outside = [(port, one.options) for one in self.around if (port := _relay(one.source, self.box)) is not None]
         for edge in self.within if outside else ():
             relay = _relay(edge.target, self.box)
             yield from ((edge, options) for port, options in outside if port is relay)
 
     def through(self, edge: Edge) -> list[Edge]:
-        """Give the edges that one becomes when the border is gone; what begins there is met on the way."""
+        """Return the edges that one becomes when the border is gone; what begins there is met on the way."""
         begin, source = _relay(edge.source, self.box), edge.source
         if begin is not None:
             inner = self.promotions.of(begin.name) if begin.kind == "parameter" else ()
@@ -316,7 +312,7 @@ class _Border:
         return found
 
     def _joined(self, parts: tuple[Edge, ...], source: SourceEnd, target: TargetEnd) -> Edge:
-        """Give the one edge that several in a row are; the outermost says how its queue is (rule G1)."""
+        """Return the one edge that several in a row are; the outermost says how its queue is (rule G1)."""
         if len(parts) == 1 and parts[0].source is source and parts[0].target is target:
             return parts[0]
         outside = next((one for one in parts if one not in self.within), parts[0]).options

@@ -1,7 +1,7 @@
 """Hot reload: the types of a changed module replace those of its nodes (rule R4).
 
 The source runs in a new module, so that code under way, and old types as long as somebody has them, go on with the old
-one. If anything about it fails, all is as before. Stands on `commands`; whoever carries the commands out keeps
+one. If anything about it fails, all is as before. Depends on `commands`; whoever carries the commands out keeps
 parameters, edges and gates.
 """
 
@@ -96,7 +96,7 @@ def _run(code: CodeType, module: ModuleType) -> None:
 
 
 def _nodes_of(graph: HasLevel, module: str) -> Iterator[tuple[Node, str]]:
-    """Give the nodes whose types are of a module, and by what references; not those inside such a subgraph."""
+    """Yield the nodes whose types are of a module, and by what references; not those inside such a subgraph."""
     waiting = list(level_of(graph).nodes.values())
     while waiting:
         node = waiting.pop(0)
@@ -108,7 +108,7 @@ def _nodes_of(graph: HasLevel, module: str) -> Iterator[tuple[Node, str]]:
 
 
 def _types_in(owner: object, module: str) -> Iterator[tuple[Any, str]]:
-    """Give the node types of a module, those inside its classes too, and their references."""
+    """Yield the node types of a module, those inside its classes too, and their references."""
     for value in list(vars(owner).values()):
         if isinstance(value, NodeFunction) or (isinstance(value, type) and issubclass(value, Node)):
             reference = value._type.reference

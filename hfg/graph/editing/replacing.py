@@ -79,11 +79,7 @@ def _replace_box(steps: Steps, around: Level, old: Node, new: Node, edges: list[
 
 
 def _port_of(end: SourceEnd, old: Node, new: Node) -> Any:  # noqa: ANN401 - a port of the same kind
-    """Return the port of the new node that replaces one of the old.
-
-    Raises:
-      GraphError: there is none.
-    """
+    """Return the port of the new node that replaces one of the old."""
     if not isinstance(end, Port) or end.node is not old:
         return end
     try:

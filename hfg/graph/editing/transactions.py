@@ -77,7 +77,7 @@ def _target(command: Command, number: int) -> object:
 
 
 def history_of(graph: HasLevel) -> History[Transaction]:
-    """Give the history of a whole graph."""
+    """Return the history of a whole graph."""
     return level_of(graph).whole.history
 
 
@@ -130,7 +130,7 @@ def prepare(graph: HasLevel, commands: Sequence[Command], *, check: bool = True)
 
 
 def may_break(commands: Sequence[Command]) -> bool:
-    """Whether the whole is to be checked after these."""
+    """Return whether the whole is to be checked after these."""
     return any(isinstance(command, _MAY_BREAK) for command in commands)
 
 

@@ -1,6 +1,6 @@
 """Types as text, "list[my_robot.types.Pose]", for commands that declare ports; and back.
 
-A class is called by its module and name, those of Python by their name alone. Stands on errors.
+A class is called by its module and name, those of Python by their name alone. Depends on errors.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ __all__ = ["text_of_type", "type_of_text"]
 
 
 def text_of_type(hint: object) -> str | None:
-    """Give what `type_of_text` reads; None for a type that has no name."""
+    """Return what `type_of_text` reads; None for a type that has no name."""
     if hint is None or hint is type(None):
         return "None"
     if hint is Any:

@@ -3,7 +3,7 @@
 A group with a process is a part; all other nodes, and the graph's own ports, are the main part. An edge between two
 parts appears in both: in the first it ends at an `End` that stands for the link, in the second it begins at one, and a
 `CutEdge` says what the two have in common. Everything keeps its path, its label and its number, so that whoever
-watches a part finds what he knows of the whole. Stands on `flat_graph`.
+watches a part finds what he knows of the whole. Depends on `flat_graph`.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Cutting(msgspec.Struct, frozen=True, eq=False):
     findings: list[Problem]
 
     def edges_of(self, part: str) -> Iterator[CutEdge]:
-        """Give those with an end in a part."""
+        """Return those with an end in a part."""
         return (edge for edge in self.edges if part in (edge.source, edge.target))
 
 
@@ -75,7 +75,7 @@ def cut(flat: FlatGraph) -> Cutting:
 
 
 def _part_of(group: GroupSpec | None) -> str:
-    """Give the part in which the nodes of a group run."""
+    """Return the part in which the nodes of a group run."""
     return group.name if group is not None and group.process else MAIN
 
 
@@ -143,7 +143,7 @@ class _Cutter:
         return None
 
     def _end_home(self, end: End, edge: FlatEdge) -> str | None:
-        """Give the part of one end; None if it has none, and that is told."""
+        """Return the part of one end; None if it has none, and that is told."""
         if end.node >= 0:
             return self.home[end.node]
         if end.node == ROOT:

@@ -1,6 +1,6 @@
 """What a graph is once its subgraphs are dissolved: plain data for runners and checks; `flat` makes it.
 
-Stands on `structure`, for the nodes, edges and levels it refers to.
+Depends on `structure`, for the nodes, edges and levels it refers to.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LINK: Final = -(2**62)
 
 
 def scope_end(scope: int) -> int:
-    """Give the `End.node` of a dissolved subgraph, whose automatic ports remain; its own inverse."""
+    """Return the `End.node` of a dissolved subgraph, whose automatic ports remain; its own inverse."""
     return -2 - scope
 
 
@@ -108,7 +108,7 @@ class FlatEdge(msgspec.Struct, eq=False):
 
     @property
     def is_event_edge(self) -> bool:
-        """Whether it has a queue."""
+        """Return whether it has a queue."""
         return self.source.kind in ("event", "observable")
 
 
@@ -143,7 +143,7 @@ class FlatGraph(msgspec.Struct, eq=False):
         return level_of(self.graph)
 
     def walk(self) -> Iterator[FlatGraph]:
-        """Give this graph and all that iterate inside it."""
+        """Yield this graph and all that iterate inside it."""
         waiting = [self]
         while waiting:
             flat = waiting.pop()

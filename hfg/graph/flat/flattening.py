@@ -2,7 +2,7 @@
 
 Subgraphs are dissolved: edges are followed through their ports from end to end, parameters to those they stand for.
 What iterates (rule G4) stays one node with a flat graph of its own. Everything is in depth-first order of adding, edges
-in that of connecting. Nothing recurses: graphs may be as deep as they like. Stands on `structure`; changes nothing
+in that of connecting. Nothing recurses: graphs may be as deep as they like. Depends on `structure`; changes nothing
 there.
 """
 
@@ -122,7 +122,7 @@ class EdgeFollower:
                     self.behind.setdefault(relay, []).append(edge)
 
     def relay(self, end: SourceEnd) -> Port | None:
-        """Give the port of a dissolved subgraph that an end is a side of; None if edges really begin or end there."""
+        """Return the port of a dissolved subgraph that an end is a side of; None if edges really begin or end there."""
         if isinstance(end, InnerSource | InnerTarget):
             return end.outer if end.node in self.scope_of else None
         if not isinstance(end, Port) or end.kind == "parameter" or end.node not in self.scope_of:
@@ -162,7 +162,7 @@ class EdgeFollower:
                 stack += [((*segments, onward), (*relays, relay)) for onward in reversed(self.behind.get(relay, ()))]
 
     def _inner_parameters(self, port: ParameterPort[Any]) -> Iterator[tuple[ParameterPort[Any], tuple[int, ...]]]:
-        """Give the parameters of nodes that one stands for, mostly itself, and the scopes on the way."""
+        """Yield the parameters of nodes that one stands for, mostly itself, and the scopes on the way."""
         stack: list[tuple[ParameterPort[Any], tuple[int, ...]]] = [(port, ())]
         while stack:
             found, via = stack.pop()
@@ -210,7 +210,7 @@ class EdgeFollower:
         return End(index, port.kind, port.name, port)
 
     def _make_border(self, port: InnerSource[Any] | InnerTarget[Any] | Observable[Any]) -> End | None:
-        """Give the end that no node has: at what feeds from outside, or at the boundary of what iterates."""
+        """Return the end that no node has: at what feeds from outside, or at the boundary of what iterates."""
         if not is_port(port):
             return End(ROOT, "observable", "observable", port)
         if port.kind in ("slot", "event"):

@@ -1,6 +1,6 @@
 """Rings in a directed graph: strongly connected parts and a short cycle of each, without recursion at any depth.
 
-Nodes are the numbers from 0; `successors[n]` lists where the edges of `n` lead. Stands on nothing.
+Nodes are the numbers from 0; `successors[n]` lists where the edges of `n` lead. Depends on nothing.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ __all__ = ["rings", "shortest_ring", "strongly_connected"]
 
 
 def strongly_connected(successors: Sequence[Sequence[int]]) -> list[list[int]]:
-    """Give the strongly connected parts, each sorted; a part comes behind those it leads to.
+    """Return the strongly connected parts, each sorted; a part comes behind those it leads to.
 
     Tarjan's algorithm (1972) with the recursion turned into a stack of (node, next successor).
     """
@@ -58,7 +58,7 @@ def strongly_connected(successors: Sequence[Sequence[int]]) -> list[list[int]]:
 
 
 def rings(successors: Sequence[Sequence[int]]) -> list[list[int]]:
-    """Give the parts in which something can go round, in order of their first node."""
+    """Return the parts in which something can go round, in order of their first node."""
     if _is_acyclic(successors):  # as most graphs are, and this is told at a third of the cost
         return []
     found = [part for part in strongly_connected(successors) if len(part) > 1 or part[0] in successors[part[0]]]
@@ -66,7 +66,7 @@ def rings(successors: Sequence[Sequence[int]]) -> list[list[int]]:
 
 
 def _is_acyclic(successors: Sequence[Sequence[int]]) -> bool:
-    """Whether taking away what nothing leads to, again and again, takes all (Kahn, 1962)."""
+    """Return whether taking away what nothing leads to, again and again, takes all (Kahn, 1962)."""
     leading = [0] * len(successors)
     for following in successors:
         for successor in following:
@@ -81,7 +81,7 @@ def _is_acyclic(successors: Sequence[Sequence[int]]) -> bool:
 
 
 def shortest_ring(part: Sequence[int], successors: Sequence[Sequence[int]]) -> list[int]:
-    """Give the nodes of a shortest cycle through the first node of a strongly connected part, beginning with it."""
+    """Return the nodes of a shortest cycle through the first node of a strongly connected part, beginning with it."""
     start, inside = part[0], set(part)
     came_from: dict[int, int] = {}
     queue = deque([start])

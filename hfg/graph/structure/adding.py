@@ -1,4 +1,4 @@
-"""Adding a node: who may become a member of a graph, and which options fit whom. Stands on levels and options."""
+"""Adding a node: who may become a member of a graph, and which options fit whom. Depends on levels and options."""
 
 from __future__ import annotations
 
@@ -85,11 +85,7 @@ def _take_back(level: Level, node: Node) -> None:
 
 
 def _need_new(node: object) -> None:
-    """Refuse what is no node or is in a graph already.
-
-    Raises:
-      GraphError: saying what to add instead.
-    """
+    """Refuse what is no node or is in a graph already."""
     if not isinstance(node, Node):
         name = getattr(node, "__name__", None)
         if name is not None and hasattr(node, "_type"):
@@ -111,11 +107,7 @@ def _need_new(node: object) -> None:
 
 
 def _with_iterated(node: Node, path: str, given: NodeGiven) -> NodeGiven:
-    """Return the options with the inputs that a subgraph iterates over, as said in `add` or else by its type (rule G4).
-
-    Raises:
-      GraphError: the node is no subgraph, or has no such input.
-    """
+    """Return the options with the inputs that a subgraph iterates over, from `add` or from its type (rule G4)."""
     said = given.get("iterate_over", ())
     if not isinstance(said, Iterable):
         raise GraphError(f'node "{path}": iterate_over takes names of inputs, as in ("items",), got {said!r}')
@@ -136,11 +128,7 @@ def _with_iterated(node: Node, path: str, given: NodeGiven) -> NodeGiven:
 
 
 def _need_subgraph_options(node: Node, options: NodeOptions) -> None:
-    """Refuse options about firings for a subgraph that is dissolved: it never fires.
-
-    Raises:
-      GraphError: naming the option.
-    """
+    """Refuse options about firings for a subgraph that is dissolved: it never fires."""
     if options.iterate_over:
         return
     for name in having(NodeOptions, ""):

@@ -1,4 +1,4 @@
-"""Where nodes run: declaring groups, and moving nodes between them (rule R1). Stands on levels and options."""
+"""Where nodes run: declaring groups, and moving nodes between them (rule R1). Depends on levels and options."""
 
 from __future__ import annotations
 

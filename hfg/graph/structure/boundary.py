@@ -1,6 +1,6 @@
 """The graph's own ports: `start`, `stop`, `abort` (rule A10), and those fed and read from outside (rule P10).
 
-Inside the graph an input of the graph is a source and an output a target, so they are bound as such. Stands on ports.
+Inside the graph an input of the graph is a source and an output a target, so they are bound as such. Depends on ports.
 """
 
 from __future__ import annotations
@@ -49,17 +49,17 @@ class Boundary:
         self.outputs: dict[str, GraphOutput[Any]] = {}
 
     def for_inside(self) -> Boundary:
-        """Give what the inside of a subgraph sees of it: how the whole begins and ends (rule A10), no other port."""
+        """Return what the inside of a subgraph sees of it: how the whole begins and ends (rule A10), no other port."""
         seen = copy.copy(self)
         seen.inputs, seen.outputs = {}, {}
         return seen
 
     def by_name(self) -> dict[str, Port]:
-        """Give all ports; inputs and outputs share their names."""
+        """Return all ports; inputs and outputs share their names."""
         return {"start": self.start, "stop": self.stop, "abort": self.abort, **self.inputs, **self.outputs}
 
     def has(self, port: object) -> bool:
-        """Say whether it is one of the three that are the whole graph's, wherever they are named (rule A10)."""
+        """Return whether it is one of the three that are the whole graph's, wherever they are named (rule A10)."""
         return port is self.start or port is self.stop or port is self.abort
 
     def add(self, port: GraphInput[Any] | GraphOutput[Any]) -> None:

@@ -1,7 +1,7 @@
 """Connecting: every reason to refuse an edge at once (rules P1-P9, G1, G4), and declaring one that may be.
 
 What only shows once ports of subgraphs are followed from end to end (two edges into one input, a queue on what turns
-out to be synchronous) is found by the check. Stands on levels, edges, types and options.
+out to be synchronous) is found by the check. Depends on levels, edges, types and options.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def connect(level: Level, source: SourceEnd | str, target: TargetEnd | str, said
 
 
 def _level_for(level: Level, source: SourceEnd, target: TargetEnd) -> Level:
-    """Give the level to which an edge belongs.
+    """Return the level to which an edge belongs.
 
     `graph.start.activates(...)` inside a subgraph asks the whole graph, whose port it is: the edge belongs where its
     node is (rule A10).

@@ -102,11 +102,11 @@ class Connections:
         return self._order
 
     def position(self, edge: Edge) -> int:
-        """Give the place of an edge in the order."""
+        """Return the place of an edge in the order."""
         return self.order.position(edge)
 
     def at(self, *nodes: object) -> list[Edge]:
-        """Give the edges that begin or end at ports of some nodes, or at inner sides of them; in order."""
+        """Return the edges that begin or end at ports of some nodes, or at inner sides of them; in order."""
         order = self.order
         return sorted({edge: None for node in nodes for edge in self._at.get(node, ())}, key=order.label)
 

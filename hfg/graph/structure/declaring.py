@@ -1,4 +1,4 @@
-"""Declaring the inputs and outputs of the whole graph (rule P10). Stands on levels and types."""
+"""Declaring the inputs and outputs of the whole graph (rule P10). Depends on levels and types."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Edges as they are declared, before subgraphs are dissolved; and what can be asked of one of their ends.
 
-Stands on ports and options; knows neither graphs nor what is right or wrong.
+Depends on ports and options; knows neither graphs nor what is right or wrong.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Edge(msgspec.Struct, frozen=True, eq=False):
 
 
 def end_path(end: object) -> str:
-    """Give the path of a port; an observable from outside has none."""
+    """Return the path of a port; an observable from outside has none."""
     path = getattr(end, "path", None) if isinstance(end, Source | Target) else None
     return path if isinstance(path, str) else "observable"
 
@@ -84,17 +84,17 @@ def is_port(end: object) -> TypeIs[PortEnd]:
 
 
 def is_feed(end: object) -> bool:
-    """Whether it is a plain observable, which feeds from outside; an event is one too, but a port."""
+    """Return whether it is a plain observable, which feeds from outside; an event is one too, but a port."""
     return not isinstance(end, _ENDS)
 
 
 def owner_of(end: SourceEnd) -> object:
-    """Give the node, or whole graph, that an end belongs to as seen from outside; an inner side belongs to nobody."""
+    """Return the node, or whole graph, that an end belongs to as seen from outside; an inner side belongs to nobody."""
     return end.node if isinstance(end, Port) else None
 
 
 def is_single(target: TargetEnd) -> bool:
-    """Whether at most one edge may lead into it (rule P2): inputs and parameters.
+    """Return whether at most one edge may lead into it (rule P2): inputs and parameters.
 
     A subgraph's output seen from inside is a relay, at which streams may converge on their way into a slot (rule G1);
     that no input gets two edges so is seen by the check. What iterates makes one list of each output (rule G4).
@@ -103,7 +103,7 @@ def is_single(target: TargetEnd) -> bool:
 
 
 def type_of(end: PortEnd) -> object:
-    """Give the type that an edge meets; outside what iterates, collections of what is declared (rule G4)."""
+    """Return the type that an edge meets; outside what iterates, collections of what is declared (rule G4)."""
     names = iterated(end.node)
     if not names or isinstance(end, InnerSource | InnerTarget):
         return end.type

@@ -1,6 +1,6 @@
 """What a path leads to (rule G3): a node, a port behind a dot, the side of a subgraph's port that looks into it.
 
-Stands on levels.
+Depends on levels.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def split_inner(name: str, path: str) -> tuple[str, bool]:
 
 
 def inner_side(node: Node, found: Sequence[Port], path: str) -> InnerSource[Any] | InnerTarget[Any]:
-    """Give the side of a subgraph's port that looks into it; of several the first.
+    """Return the side of a subgraph's port that looks into it; of several the first.
 
     Raises:
       GraphError: the node is no subgraph, or has no such port.
@@ -113,7 +113,7 @@ def _no_such_port(node: Node, name: str, path: str) -> GraphError:
 
 
 def candidates(node: Node, name: str) -> list[Port]:
-    """Give all ports of a node that have this name; automatic ones too."""
+    """Return all ports of a node that have this name; automatic ones too."""
     found: list[Port] = []
     for ports in (node.ports.inputs, node.ports.outputs, node.ports.events, node.ports.slots, node.ports.parameters):
         try:
@@ -124,7 +124,7 @@ def candidates(node: Node, name: str) -> list[Port]:
 
 
 def same_port(node: Node, like: Port) -> Port:
-    """Give the port of a node that has the kind and name of another's.
+    """Return the port of a node that has the kind and name of another's.
 
     Raises:
       UsageError: it has none.

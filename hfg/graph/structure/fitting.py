@@ -1,6 +1,6 @@
 """Which options fit which node: what a type's code cannot do is refused where it is asked for (rules F14, X1).
 
-What depends on groups and edges too, which may come later, is for the check. Stands on options.
+What depends on groups and edges too, which may come later, is for the check. Depends on options.
 """
 
 from __future__ import annotations

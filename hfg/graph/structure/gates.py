@@ -1,4 +1,4 @@
-"""Gates: work coupled to activity without touching the node (rule A11). Stands on nodes."""
+"""Gates: work coupled to activity without touching the node (rule A11). Depends on nodes."""
 
 from __future__ import annotations
 

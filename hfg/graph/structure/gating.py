@@ -1,4 +1,4 @@
-"""Setting a gate, and every reason to refuse one (rule A11). Stands on levels."""
+"""Setting a gate, and every reason to refuse one (rule A11). Depends on levels."""
 
 from __future__ import annotations
 

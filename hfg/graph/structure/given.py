@@ -1,6 +1,6 @@
 """Checks what is given as options, and makes `EdgeOptions`, `NodeOptions` and a `GroupSpec` of it.
 
-Equal options are one object: ten thousand nodes with nothing special share theirs. Stands on `options` and errors.
+Equal options are one object: ten thousand nodes with nothing special share theirs. Depends on `options` and errors.
 """
 
 from __future__ import annotations

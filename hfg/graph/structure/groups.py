@@ -51,7 +51,7 @@ class Groups:
         del self.by_name[name]
 
     def state(self) -> GroupsState:
-        """Give what `restore` takes."""
+        """Return what `restore` takes."""
         return dict(self.by_name), set(self._declared)
 
     def restore(self, state: GroupsState) -> None:

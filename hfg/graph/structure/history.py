@@ -56,7 +56,7 @@ class History(Generic[Step]):
             self.undone.clear()
 
     def next_undo(self) -> Step:
-        """Give what would be undone.
+        """Return what would be undone.
 
         Raises:
           UsageError: there is nothing.
@@ -64,7 +64,7 @@ class History(Generic[Step]):
         return self._last(self.done, "undo", "nothing was edited by commands yet")
 
     def next_redo(self) -> Step:
-        """Give what would be redone.
+        """Return what would be redone.
 
         Raises:
           UsageError: there is nothing.

@@ -1,7 +1,7 @@
 """One level of a graph: what lies directly in the whole, or directly inside one subgraph, with its own invariants.
 
 `Graph`, which users hold, is the face of a level; everything below the face works on levels. Nothing is checked here:
-who adds, connects or edits has done that. Stands on the tables of members, connections, gates and promotions.
+who adds, connects or edits has done that. Depends on the tables of members, connections, gates and promotions.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ class HasLevel(Owner, Protocol):
 
 
 def inside(node: object) -> Level | None:
-    """Give what lies inside a subgraph; None for other nodes, and before it is built."""
+    """Return what lies inside a subgraph; None for other nodes, and before it is built."""
     level = getattr(node, "_level", None) if isinstance(node, Box) else None
     return level if isinstance(level, Level) else None
 
 
 def level_of(graph: HasLevel) -> Level:
-    """Give what is behind the face of a graph."""
+    """Return what is behind the face of a graph."""
     return graph._level
 
 
@@ -121,15 +121,15 @@ class Level:
         return depth
 
     def path_to(self, name: str) -> str:
-        """Give the path of a node of this name here."""
+        """Return the path of a node of this name here."""
         return name if self.owner is None else f"{self.path}/{name}"
 
     def holds(self, node: Node) -> bool:
-        """Say whether a node lies anywhere in the same whole graph."""
+        """Return whether a node lies anywhere in the same whole graph."""
         return node._place is not None and level_of(node._place.graph).whole is self.whole
 
     def walk(self) -> list[Level]:
-        """Give this level and all inside it, the outer ones first."""
+        """Return this level and all inside it, the outer ones first."""
         found = [self]
         for level in found:  # grows while it is walked through, which is the point: no recursion at any depth
             found += [one for node in level.members.boxes if (one := inside(node)) is not None]
@@ -165,7 +165,7 @@ class Level:
 
 
 def nodes_within(node: Node) -> Iterator[Node]:
-    """Give a node and all inside it."""
+    """Yield a node and all inside it."""
     waiting = [node]
     while waiting:
         one = waiting.pop()

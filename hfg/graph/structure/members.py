@@ -26,7 +26,7 @@ class Members:
         self._boxes: dict[Box, None] = {}  # those among them, once there is an order
 
     def free_name(self, base: str) -> tuple[str, int]:
-        """Give the type's name, or with _2, _3 in order of adding; and the number to `count` once the node is in."""
+        """Return the type's name, or with _2, _3 in order of adding; and the number to `count` once the node is in."""
         number = self._counts.get(base, 0) + 1
         name = base if number == 1 else f"{base}_{number}"
         while name in self.nodes:  # somebody gave this name by hand
@@ -52,7 +52,7 @@ class Members:
         return list(self._boxes) if self.order.items else []
 
     def position(self, name: str) -> int:
-        """Give the place of a node in the order."""
+        """Return the place of a node in the order."""
         return self.order.position(self.nodes[name])
 
     def append(self, name: str, node: Node) -> None:
@@ -76,7 +76,7 @@ class Members:
         self.nodes[name] = node
 
     def rename(self, before: str, after: str) -> None:
-        """Give a node another name at the same place."""
+        """Return a node another name at the same place."""
         position = self.position(before)
         self._insert(position, after, self.nodes.pop(before))
 

@@ -1,7 +1,7 @@
 """Where a node is, said to the node itself: the one place that writes what a graph keeps on its nodes.
 
 A node carries its place, its options and, if it is a subgraph, its inside, in fields that begin with an underscore
-because all other names are its author's. Stands on levels.
+because all other names are its author's. Depends on levels.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def leave(node: Node) -> None:
 
 
 def place(node: Node, level: Level, name: str) -> None:
-    """Say where a node is, and where all inside it are."""
+    """Return where a node is, and where all inside it are."""
     node._place = Place(level.face, name, level.path_to(name))
     waiting = [node]
     while waiting:
@@ -40,12 +40,12 @@ def place(node: Node, level: Level, name: str) -> None:
 
 
 def set_options(node: Node, options: NodeOptions) -> None:
-    """Give a node other options."""
+    """Return a node other options."""
     node._options = options
 
 
 def open_box(node: Node, level: Level) -> None:
-    """Give a subgraph its inside."""
+    """Return a subgraph its inside."""
     if is_box(node):
         node._level = level
 
@@ -57,5 +57,5 @@ def close_box(node: Node) -> None:
 
 
 def write_parameter(node: Node, name: str, value: object) -> None:
-    """Give a parameter a value that it had, or that was checked; no other parameter follows."""
+    """Return a parameter a value that it had, or that was checked; no other parameter follows."""
     node._parameters[name] = own_copy(value)

@@ -1,4 +1,4 @@
-"""Names: which a node may have, how messages call it, and what was probably meant (rule G3). Stands on nodes."""
+"""Names: which a node may have, how messages call it, and what was probably meant (rule G3). Depends on nodes."""
 
 from __future__ import annotations
 
@@ -45,5 +45,5 @@ def suggest(name: str, known: Iterable[str]) -> str:
 
 
 def path_of(node: Node) -> str:
-    """Give the path of a node, for messages; before it is added, its type's name stands for it."""
+    """Return the path of a node, for messages; before it is added, its type's name stands for it."""
     return node._type.name if node._place is None else node._place.path

@@ -1,7 +1,7 @@
 """Operators on edges that can be found by name (rule P9), so that commands, and later files, can say them.
 
 Any reactivex operator may stand on an edge; one made by a function that `operator` knows carries the name of that
-function and what it was given. Stands on errors.
+function and what it was given. Depends on errors.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class NamedOperator:
         self._operator = operator
 
     def __call__(self, source: Observable[Any]) -> Observable[Any]:
-        """Give what comes out of it."""
+        """Return what comes out of it."""
         return self._operator(source)
 
     @override

@@ -115,7 +115,7 @@ class Declared:
         return words + (", or None for no limit" if type(None) in _kinds(self.type) and kinds[0] is not str else "")
 
     def fits(self, value: object) -> bool:
-        """Say whether it can have a value."""
+        """Return whether it can have a value."""
         if type(value) is type(self.default) and value == self.default:
             return True
         return any(self._is(kind, value) for kind in _kinds(self.type)) and (
@@ -194,7 +194,7 @@ def having(kind: type[Fields[Any]], only: str) -> tuple[str, ...]:
 
 
 def unknown(kind: type[Fields[Any]], names: Iterable[str], call: str) -> str | None:
-    """Say which of some names is not that of an option of a call; None if all are."""
+    """Return which of some names is not that of an option of a call; None if all are."""
     known = declared(kind)
     name = next((one for one in names if one not in known), None)
     return None if name is None else f'there is no option "{name}", options are those of {call}; {suggest(name, known)}'

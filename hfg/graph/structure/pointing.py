@@ -1,6 +1,6 @@
 """What paths point at where a certain thing is meant: nodes, ports of the right direction, inner sides (rule G3).
 
-A path stands wherever the thing itself could be given, in calls as in commands. Stands on `finding`.
+A path stands wherever the thing itself could be given, in calls as in commands. Depends on `finding`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _TARGETS = ("input", "slot", "parameter")
 
 
 def level_and_name(level: Level, path: str) -> tuple[Level, str]:
-    """Give the level at which a new node's path lies, and its name there.
+    """Return the level at which a new node's path lies, and its name there.
 
     Raises:
       GraphError: the subgraph does not exist, or the name is not allowed.
@@ -41,7 +41,7 @@ def level_and_name(level: Level, path: str) -> tuple[Level, str]:
 
 
 def meant(level: Level, what: Any, at: Callable[[Level, str], Any]) -> Any:  # noqa: ANN401 - whatever `at` finds
-    """Give what was named by its path, or is given itself.
+    """Return what was named by its path, or is given itself.
 
     Args:
       level: from where the path leads.

@@ -1,4 +1,4 @@
-"""Promoting a parameter: letting one of the subgraph stand for one inside (rule G3). Stands on levels and types."""
+"""Promoting a parameter: letting one of the subgraph stand for one inside (rule G3). Depends on levels and types."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def refuse_standing(outer: ParameterPort[Any], inner: ParameterPort[Any]) -> Non
 
 
 def stands_for(port: ParameterPort[Any]) -> Iterator[ParameterPort[Any]]:
-    """Give a parameter and all those inside that it stands for."""
+    """Yield a parameter and all those inside that it stands for."""
     waiting = [port]
     while waiting:
         one = waiting.pop()

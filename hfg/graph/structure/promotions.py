@@ -1,4 +1,4 @@
-"""Promotion: a parameter of a subgraph that stands for parameters inside (rule G3). Stands on ports."""
+"""Promotion: a parameter of a subgraph that stands for parameters inside (rule G3). Depends on ports."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Promotions:
         self.by_name: dict[str, list[ParameterPort[Any]]] = {}
 
     def of(self, name: str) -> Sequence[ParameterPort[Any]]:
-        """Give the parameters inside that one of the subgraph stands for."""
+        """Return the parameters inside that one of the subgraph stands for."""
         return self.by_name.get(name, ())
 
     def has(self, inner: ParameterPort[Any]) -> bool:
-        """Say whether a parameter inside has one that stands for it."""
+        """Return whether a parameter inside has one that stands for it."""
         return any(port is inner for ports in self.by_name.values() for port in ports)
 
     def add(self, name: str, inner: ParameterPort[Any]) -> None:
@@ -39,5 +39,5 @@ class Promotions:
         self.by_name = {name: list(ports) for name, ports in promoted.items()}
 
     def copied(self) -> dict[str, list[ParameterPort[Any]]]:
-        """Give what `become` takes."""
+        """Return what `become` takes."""
         return {name: list(ports) for name, ports in self.by_name.items()}

@@ -1,7 +1,7 @@
 """Refusals that are kept instead of raised, so that the check of a graph that cannot be built tells all at once.
 
 Normally what a graph refuses is raised where it is said. Inside `keep_refusals` it is written down, and building goes
-on as well as it can. Stands on naming.
+on as well as it can. Depends on naming.
 """
 
 from __future__ import annotations

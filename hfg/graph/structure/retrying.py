@@ -15,7 +15,7 @@ Errors: TypeAlias = "Iterable[type[Exception] | str] | type[Exception] | str"
 
 
 def error_names(where: str, given: object, *, retries: object) -> tuple[str, ...]:
-    """Give the names of errors, which may be given as classes or by name; nothing is imported for them.
+    """Return the names of errors, which may be given as classes or by name; nothing is imported for them.
 
     A name is compared with those of the error that was raised and of its bases, so one of a module that is not loaded
     does no harm, and a graph file brings no code with it.

@@ -2,7 +2,7 @@
 
 Each item has a number that grows along the sequence; one that comes between two others gets a number between theirs, so
 that nobody else is renumbered. Only when two numbers have nothing between them any more, all are numbered anew; that
-takes some fifty insertions at one spot, so that its cost is shared by them. Stands on nothing.
+takes some fifty insertions at one spot, so that its cost is shared by them. Depends on nothing.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 def between(before: float | None, behind: float | None) -> float | None:
-    """Give a number between two neighbours, either of which may be missing; None if there is no room."""
+    """Return a number between two neighbours, either of which may be missing; None if there is no room."""
     if before is None:
         return 0.0 if behind is None else behind - 1.0
     if behind is None:
@@ -44,11 +44,11 @@ class Sequence(Generic[T]):
         return item in self._labels
 
     def label(self, item: T) -> float:
-        """Give the number by which it is compared with others of this sequence, until the next insertion."""
+        """Return the number by which it is compared with others of this sequence, until the next insertion."""
         return self._labels[item]
 
     def position(self, item: T) -> int:
-        """Give its place, counted from 0."""
+        """Return its place, counted from 0."""
         return bisect_left(self.items, self._labels[item], key=self._labels.__getitem__)
 
     def insert(self, position: int, item: T) -> None:

@@ -1,6 +1,6 @@
 """Boxes: nodes that hold a graph; their ports are relays between outside and inside (rules G1-G4).
 
-Users know them as `hfg.Subgraph`, which knows `hfg.Graph` and therefore is defined beside it. Stands on node types.
+Users know them as `hfg.Subgraph`, which knows `hfg.Graph` and therefore is defined beside it. Depends on node types.
 """
 
 from __future__ import annotations
@@ -65,17 +65,17 @@ class Box(Node, Relaying):
 
 
 def is_box(node: object) -> TypeIs[Box]:
-    """Say whether a node is a subgraph."""
+    """Return whether a node is a subgraph."""
     return isinstance(node, Box)
 
 
 def is_unnamed(box: Box) -> bool:
-    """Say whether its class only holds the ports and the inside of this one subgraph."""
+    """Return whether its class only holds the ports and the inside of this one subgraph."""
     return "_is_base" in vars(type(box).__bases__[0])
 
 
 def iterated(node: object) -> tuple[str, ...]:
-    """Give the names of the inputs that a subgraph iterates over (rule G4); none for other nodes."""
+    """Return the names of the inputs that a subgraph iterates over (rule G4); none for other nodes."""
     if not isinstance(node, Box) or node._options is None:
         return ()
     names: tuple[str, ...] = node._options.iterate_over

@@ -1,8 +1,9 @@
-"""Edges that run straight through subgraphs, in at one port and out at another, and whose queue they have (rule G1).
+"""Refuses to move a boundary if that would change the queue of an edge (rule G1).
 
-Of the edges that one consists of the outermost says how its queue is, among several the one nearest to the source. As
-long as no edge runs straight through a subgraph there is one that is outermost, wherever borders are drawn. One that
-does has two, and a border around the first of them alone would let the other one have its say. Stands on levels.
+An edge through subgraphs consists of several declared edges, and the outermost one decides how its queue is; among
+several, the one nearest to the source. As long as no edge enters a subgraph and leaves it again, exactly one is
+outermost, wherever boundaries are. An edge that does so has two outermost ones, and a boundary around the first of
+them would let the second decide.
 """
 
 from __future__ import annotations
@@ -26,16 +27,16 @@ def refuse_other_queues(
     is_at_border: Callable[[Edge], bool],
     what: str,
 ) -> None:
-    """Refuse a border that would change whose queue it is, being drawn or taken away.
+    """Refuse a boundary that would change a queue when it is made or removed.
 
     Args:
-      level: where the edges lie.
-      outwards: those that cross the border outwards, and the options that hold outside.
-      is_at_border: whether an edge of this level crosses the border.
+      level: the level of the edges.
+      outwards: the edges that cross the boundary outwards, with the options that apply outside.
+      is_at_border: returns whether an edge of this level crosses the boundary.
       what: "grouping" or "dissolving".
 
     Raises:
-      GraphError: an edge that leads straight into one of them has another queue.
+      GraphError: an edge that leads directly into one of them has another queue.
     """
     for edge, options in outwards:
         for first in _origins(level, edge, is_at_border):
@@ -49,7 +50,7 @@ def refuse_other_queues(
 
 
 def _origins(level: Level, edge: Edge, is_at_border: Callable[[Edge], bool]) -> Iterator[Edge]:
-    """Give the edges of this level at which begins what leads straight into one; not that itself."""
+    """Yield the edges of this level that lead directly into an edge through subgraphs, not the edge itself."""
     stack, met = [edge], {edge}
     while stack:
         one = stack.pop()
@@ -63,7 +64,7 @@ def _origins(level: Level, edge: Edge, is_at_border: Callable[[Edge], bool]) -> 
 
 
 def _before(level: Level, edge: Edge) -> Iterator[Edge]:
-    """Give the edges of a level that go on as this one, behind a subgraph that they run straight through."""
+    """Yield the edges of a level that continue as this one, after a subgraph that they run directly through."""
     port = edge.source
     within = inside(port.node) if isinstance(port, Port) and port.kind == "event" else None
     if within is not None:
@@ -72,7 +73,7 @@ def _before(level: Level, edge: Edge) -> Iterator[Edge]:
 
 
 def _entries(within: Level, port: Port) -> list[Port]:
-    """Give the ports of a subgraph from which edges run straight to one of its events."""
+    """Return the ports of a subgraph from which edges run directly to one of its events."""
     own = within.connections.at(port.node)
     stack = [one for one in own if isinstance(one.target, InnerTarget) and one.target.outer is port]
     found: list[Port] = []
