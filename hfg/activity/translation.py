@@ -15,8 +15,8 @@ from hfg.activity.states import StateNode, event_name, letter_name, one_by_one, 
 from hfg.errors import GraphError, Problem
 from hfg.graph import Graph
 from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, flatten
-from hfg.graph.structure.finding import candidates
 from hfg.graph.structure.level import level_of
+from hfg.graph.structure.paths import candidates
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node
 from hfg.ports import SlotPort

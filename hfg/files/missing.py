@@ -16,7 +16,7 @@ from typing_extensions import override
 from hfg.errors import Problem
 from hfg.graph.checks.checking import also
 from hfg.graph.editing.document import EdgeDocument, NodeDocument
-from hfg.graph.flat.flattening import FlatGraph
+from hfg.graph.flat import FlatGraph
 from hfg.graph.structure.option import having
 from hfg.graph.structure.options import EdgeFields
 from hfg.nodetypes.description import EventSpec, InputSpec, NodeType, OutputSpec, SlotSpec

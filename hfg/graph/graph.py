@@ -23,20 +23,16 @@ from hfg.graph.editing import transactions
 from hfg.graph.editing.commands import Command
 from hfg.graph.editing.to_commands import as_commands
 from hfg.graph.structure.adding import add
-from hfg.graph.structure.assigning import declare_group, move
 from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.connecting import connect
-from hfg.graph.structure.declaring import need_new_port
+from hfg.graph.structure.declaring import declare_group, move, need_new_port, promote, set_gate
 from hfg.graph.structure.edge import Edge
-from hfg.graph.structure.finding import find
 from hfg.graph.structure.gates import Gate
-from hfg.graph.structure.gating import set_gate
 from hfg.graph.structure.level import Level, Whole, inside
 from hfg.graph.structure.naming import need_name
 from hfg.graph.structure.option import Fields, unknown
 from hfg.graph.structure.options import EdgeGiven, EdgeOptions, GroupGiven, GroupSpec, NodeGiven, NodeOptions
-from hfg.graph.structure.pointing import node_at
-from hfg.graph.structure.promoting import promote
+from hfg.graph.structure.paths import find, node_at
 from hfg.graph.structure.subgraph import Box
 from hfg.nodetypes.node import Node, Place
 from hfg.ports import EventPort, ParameterPort, Port, SlotPort, Source, Target

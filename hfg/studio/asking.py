@@ -10,7 +10,7 @@ from typing import Any, Final
 import msgspec
 
 from hfg.graph.structure.level import inside, level_of
-from hfg.graph.structure.pointing import node_at, parameter_at
+from hfg.graph.structure.paths import node_at, parameter_at
 from hfg.studio.clipboard import pasted, text_of_nodes
 from hfg.studio.following import Following
 from hfg.studio.palette import search_types, type_of_reference

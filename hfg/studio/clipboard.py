@@ -11,7 +11,7 @@ from hfg.errors import GraphError
 from hfg.graph import Graph
 from hfg.graph import commands as c
 from hfg.graph.structure.level import inside, level_of
-from hfg.graph.structure.pointing import node_at
+from hfg.graph.structure.paths import node_at
 from hfg.studio.refusing import Refused
 
 __all__ = ["pasted", "text_of_nodes"]

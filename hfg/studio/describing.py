@@ -19,7 +19,7 @@ from hfg.graph.editing.data import edge_as_data
 from hfg.graph.structure.edge import end_path, is_feed, is_port
 from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.naming import path_of
-from hfg.graph.structure.pointing import node_at
+from hfg.graph.structure.paths import node_at
 from hfg.graph.structure.subgraph import is_box, is_unnamed
 from hfg.nodetypes.description import NodeType
 from hfg.nodetypes.node import Node

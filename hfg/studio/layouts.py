@@ -17,7 +17,7 @@ from hfg.graph import Graph, drawing
 from hfg.graph.drawing import View
 from hfg.graph.drawing.seen import Kind
 from hfg.graph.structure.level import Level, inside, level_of
-from hfg.graph.structure.pointing import node_at
+from hfg.graph.structure.paths import node_at
 from hfg.studio.tables import Tables
 
 __all__ = ["Layouts", "key_of", "lay_out", "positions"]

@@ -8,7 +8,7 @@ from typing import Any, Final, TypeAlias
 from hfg.graph.editing import Transaction, history_of
 from hfg.graph.editing.commands import Command, Note, decode
 from hfg.graph.structure.level import inside, level_of
-from hfg.graph.structure.pointing import node_at
+from hfg.graph.structure.paths import node_at
 from hfg.studio import messages as m
 from hfg.studio.asking import ask
 from hfg.studio.following import Following

@@ -16,7 +16,7 @@ from hfg.graph.structure.connecting import refuse
 from hfg.graph.structure.edge import Edge, PortEnd, is_port, type_of
 from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.options import PLAIN
-from hfg.graph.structure.pointing import source_at, target_at
+from hfg.graph.structure.paths import source_at, target_at
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, Port
 from hfg.studio.refusing import parts_of

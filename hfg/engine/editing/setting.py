@@ -10,8 +10,8 @@ from hfg.base.values import own_copy
 from hfg.engine.model.running_node import BACKOFF, BETWEEN_FIRINGS, DISABLED, RunningNode
 from hfg.engine.rules import node_lifecycle
 from hfg.errors import NotRunning, UsageError
+from hfg.graph.structure.declaring import stands_for
 from hfg.graph.structure.level import inside
-from hfg.graph.structure.promoting import stands_for
 from hfg.nodetypes.description import read_only_refusal
 from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort

@@ -37,7 +37,7 @@ from hfg.graph.editing.commands import Command
 from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.edge import Edge, PortEnd
 from hfg.graph.structure.level import level_of
-from hfg.graph.structure.pointing import parameter_at
+from hfg.graph.structure.paths import parameter_at
 from hfg.nodetypes.node import Node
 from hfg.ports import EventPort, ParameterPort, Port, SlotPort
 from hfg.trace import Consumer

@@ -19,7 +19,7 @@ from hfg.files.missing import MissingNode
 from hfg.graph import Graph
 from hfg.graph.editing.document import BoxDocument, Document, EdgeDocument, NodeDocument
 from hfg.graph.structure.level import level_of
-from hfg.graph.structure.pointing import node_at
+from hfg.graph.structure.paths import node_at
 from hfg.nodetypes.node import Node
 
 __all__ = ["prove"]

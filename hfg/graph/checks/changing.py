@@ -16,7 +16,7 @@ from types import CodeType, FunctionType
 from typing import Any, Final
 
 from hfg.errors import Problem
-from hfg.graph.flat.flattening import FlatGraph, FlatNode
+from hfg.graph.flat import FlatGraph, FlatNode
 from hfg.nodetypes.node import Node, NodeType
 
 __all__ = ["changed_inputs"]

@@ -36,7 +36,7 @@ from hfg.graph.checks.nodes import (
     unused_scheduling,
 )
 from hfg.graph.checks.processes import process_borders
-from hfg.graph.flat.flattening import FlatGraph, flatten
+from hfg.graph.flat import FlatGraph, flatten
 from hfg.graph.structure.level import HasLevel
 
 __all__ = ["Check", "also", "check", "check_flat"]

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from hfg.errors import Problem
-from hfg.graph.flat.flattening import ROOT, FlatEdge, FlatGraph
+from hfg.graph.flat import ROOT, FlatEdge, FlatGraph
 from hfg.graph.structure.edge import Edge, is_feed, type_of
 from hfg.graph.structure.level import inside
 from hfg.ports import ParameterPort

@@ -18,7 +18,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
-from hfg.graph.flat.flattening import ROOT, FlatGraph, FlatNode, scope_end
+from hfg.graph.flat import ROOT, FlatGraph, FlatNode, scope_end
 from hfg.nodetypes.description import NodeType
 
 __all__ = ["endless", "runs_for_ever"]

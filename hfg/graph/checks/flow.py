@@ -14,7 +14,7 @@ from types import CodeType
 from hfg.errors import Problem
 from hfg.graph.checks.endless import endless
 from hfg.graph.checks.nodes import codes_in, functions_of
-from hfg.graph.flat.flattening import ROOT, FlatEdge, FlatGraph, scope_end
+from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, scope_end
 from hfg.graph.flat.order import rings, shortest_ring
 from hfg.nodetypes.node import Node
 from hfg.ports.automatic import sent_of

@@ -11,7 +11,7 @@ from types import CodeType, FunctionType
 from typing import Any
 
 from hfg.errors import Problem
-from hfg.graph.flat.flattening import FlatGraph
+from hfg.graph.flat import FlatGraph
 from hfg.graph.structure.level import inside
 from hfg.graph.structure.naming import suggest
 from hfg.graph.structure.options import NodeOptions

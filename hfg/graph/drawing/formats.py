@@ -19,7 +19,7 @@ from hfg.graph.drawing.picture import picture
 from hfg.graph.drawing.seen import EVERYTHING, Arrow, Kind, Picture, Shape, View
 from hfg.graph.drawing.svg import svg
 from hfg.graph.structure.level import HasLevel, Level, level_of
-from hfg.graph.structure.pointing import meant, node_at
+from hfg.graph.structure.paths import meant, node_at
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node
 

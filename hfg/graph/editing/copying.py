@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any, TypeVar, cast
 
 from hfg.graph.structure.edge import Edge
-from hfg.graph.structure.finding import same_port
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level, inside
 from hfg.graph.structure.membership import leave, open_box, set_options
+from hfg.graph.structure.paths import same_port
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, Port

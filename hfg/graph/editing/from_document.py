@@ -28,7 +28,7 @@ from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level, inside
 from hfg.graph.structure.naming import suggest
 from hfg.graph.structure.options import GroupGiven
-from hfg.graph.structure.pointing import node_at, parameter_at, source_at, target_at
+from hfg.graph.structure.paths import node_at, parameter_at, source_at, target_at
 from hfg.graph.structure.refusals import raise_refusals
 from hfg.nodetypes.node import Node
 

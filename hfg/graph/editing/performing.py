@@ -27,7 +27,7 @@ from hfg.graph.structure.level import Level, level_of, nodes_within
 from hfg.graph.structure.naming import need_name, suggest
 from hfg.graph.structure.option import given
 from hfg.graph.structure.options import PLAIN, EdgeOptions, GroupGiven, GroupSpec
-from hfg.graph.structure.pointing import level_and_name, node_at, parameter_at, source_at, target_at
+from hfg.graph.structure.paths import level_and_name, node_at, parameter_at, source_at, target_at
 
 __all__ = ["perform"]
 

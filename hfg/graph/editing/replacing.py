@@ -10,13 +10,12 @@ from typing import Any
 from hfg.errors import GraphError, HfgError
 from hfg.graph.editing.changes import EdgeChange, EdgeSwap, GateChange, NodeChange, NodeSwap
 from hfg.graph.editing.steps import Promoted, Steps, edges_of
-from hfg.graph.structure.adding import add
+from hfg.graph.structure.adding import add, need_fitting
+from hfg.graph.structure.declaring import refuse_standing
 from hfg.graph.structure.edge import Edge, SourceEnd
-from hfg.graph.structure.finding import same_port
-from hfg.graph.structure.fitting import need_fitting
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level, level_of
-from hfg.graph.structure.promoting import refuse_standing
+from hfg.graph.structure.paths import same_port
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node
 from hfg.ports import Port

@@ -32,18 +32,15 @@ from hfg.graph.editing.data import edge_as_meant
 from hfg.graph.editing.making import as_meant, fitting
 from hfg.graph.editing.type_texts import type_of_text
 from hfg.graph.structure.adding import add
-from hfg.graph.structure.assigning import move
 from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.connecting import declare_edge, refuse
-from hfg.graph.structure.declaring import need_new_port
+from hfg.graph.structure.declaring import move, need_new_port, refuse_gate, refuse_promotion, stands_for
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of
 from hfg.graph.structure.gates import Gate
-from hfg.graph.structure.gating import refuse_gate
 from hfg.graph.structure.given import edge_options, group_spec
 from hfg.graph.structure.level import Level, inside, level_of, nodes_within
 from hfg.graph.structure.options import EdgeGiven, GroupGiven, NodeGiven
 from hfg.graph.structure.places import side_of
-from hfg.graph.structure.promoting import refuse_promotion, stands_for
 from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort
 

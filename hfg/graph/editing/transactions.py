@@ -32,7 +32,7 @@ from hfg.graph.editing.commands import (
 )
 from hfg.graph.editing.performing import perform
 from hfg.graph.editing.reloading import reloaded
-from hfg.graph.flat.flattening import flatten
+from hfg.graph.flat import flatten
 from hfg.graph.structure.history import History
 from hfg.graph.structure.level import HasLevel, level_of
 

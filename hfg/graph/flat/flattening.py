@@ -14,7 +14,7 @@ from typing import Any
 from reactivex import Observable
 
 from hfg.errors import Problem
-from hfg.graph.flat.flat_graph import ROOT, End, EndKind, FlatEdge, FlatGate, FlatGraph, FlatNode, Scope, scope_end
+from hfg.graph.flat.flat_graph import ROOT, End, FlatEdge, FlatGate, FlatGraph, FlatNode, Scope, scope_end
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, is_port
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.joining import joined
@@ -24,19 +24,7 @@ from hfg.graph.structure.subgraph import iterated
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, ParameterPort, Port
 
-__all__ = [
-    "ROOT",
-    "EdgeFollower",
-    "End",
-    "EndKind",
-    "FlatEdge",
-    "FlatGate",
-    "FlatGraph",
-    "FlatNode",
-    "Scope",
-    "flatten",
-    "scope_end",
-]
+__all__ = ["EdgeFollower", "flatten"]
 
 
 def flatten(graph: HasLevel) -> FlatGraph:

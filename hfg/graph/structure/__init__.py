@@ -8,8 +8,8 @@ sequence     an order in which places are found without counting, of members and
 edge         Edge, and what is asked of its ends  subgraph     Subgraph: a node that holds a graph
 options      what is said about nodes, edges and groups besides               operators    of edges, by name
 
-adding, connecting, gating, promoting, declaring, assigning      what changes a level, and refuses what cannot be
-membership   where a node is, said to the node    naming, finding, pointing    names, and what paths lead to
+adding, connecting, declaring      what changes a level, and refuses what cannot be
+membership   where a node is, said to the node    naming, paths    names, and what paths lead to
 refusals     kept instead of raised, so that a check tells all
 """
 

@@ -17,7 +17,7 @@ from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, TargetEnd, end_pa
 from hfg.graph.structure.given import edge_options
 from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.options import PLAIN, EdgeGiven, EdgeOptions
-from hfg.graph.structure.pointing import source_at, target_at
+from hfg.graph.structure.paths import source_at, target_at
 from hfg.graph.structure.refusals import Refusable
 from hfg.graph.structure.subgraph import is_box, iterated
 from hfg.nodetypes.node import Node
