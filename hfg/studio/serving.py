@@ -23,6 +23,8 @@ from hfg.studio.web import PageOutbox, application
 __all__ = ["STATIC", "Server", "StudioDoor"]
 
 STATIC: Final = Path(__file__).with_name("static")
+"""The built page; HFG_STUDIO_STATIC names another folder, for those who work on the page."""
+
 _PORTS: Final = range(8800, 8900)
 
 

@@ -14,9 +14,9 @@ from typing import Any, Final, Protocol
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
-from starlette.requests import HTTPConnection, Request
+from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
-from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.routing import Mount, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
@@ -219,12 +219,8 @@ def application(door: Door, entrance: Entrance, static: Path) -> Any:
             visit.leave()
             pump.cancel()
 
-    async def health(request: Request) -> Response:
-        return PlainTextResponse("ok\n")
-
     routes = [
         WebSocketRoute("/ws", page),
-        Route("/health", health),
         Mount("/", _Files(directory=static, html=True, check_dir=False)),
     ]
     return _Guard(Starlette(routes=routes), entrance)
