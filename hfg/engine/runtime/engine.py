@@ -126,6 +126,18 @@ class Engine:
         self._ready_groups: deque[Dispatching] = self.core.ready_groups
         self.scheduler = rx.RunScheduler(self)
         self.code = CodeRunner(self, self.core, self.loop, self.context)
+        self._configure()
+        self.tasks = TaskRunner(self, self.core, self.code)
+        self.groups = self._make_groups()
+        self._loop_group = self.groups["loop"]
+        self._instant = -1.0
+        self._instant_steps = 0
+        self.beside_work = 0
+        plan.build(self.core, flat, self.groups, loop=self._loop_group)
+
+    def _configure(self) -> None:
+        """Pass the settings that decisions need to the core."""
+        settings = self.settings
         sharing = Sharing() if settings.debug else None
         if sharing is not None:
             self.callbacks.finished.append(sharing.end)
@@ -137,13 +149,6 @@ class Engine:
             fuse_after=settings.fuse_after,
             code=self.code,
         )
-        self.tasks = TaskRunner(self, self.core, self.code)
-        self.groups = self._make_groups()
-        self._loop_group = self.groups["loop"]
-        self._instant = -1.0
-        self._instant_steps = 0
-        self.beside_work = 0
-        plan.build(self.core, flat, self.groups, loop=self._loop_group)
 
     # --- time -------------------------------------------------------------------------------------------------------
 
