@@ -335,7 +335,7 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "fire a slot's wrong type": (lambda: fire(Count(), slot="start_at", value="a"), 'slot "count.start_at" is declare'),
     "fire a slot by name": (lambda: fire(Count(), slot="start_at", at=1), 'a slot takes value=..., got "at"'),
     "fire no hook": (lambda: fire(Count(), hook="stup"), '"stup" is not a hook of a node; did you mean "setup"?'),
-    "fire process as a hook": (lambda: fire(Count(), hook="process"), "no hook of a node: leave hook= out for a firin"),
+    "fire process as a hook": (lambda: fire(Count(), hook="process"), "is not a hook of a node: leave hook= out for a firin"),
     "fire a hook it has not": (lambda: fire(Count(), hook="end"), 'count does not define "end", so there is nothing t'),
     "fire a hook with values": (lambda: fire(FailsEnd(), hook="end", value=1), 'hook "end" takes no values, got "valu'),
     "fire a hook that is none": (lambda: fire(Count(), hook=print), "is not a hook of a node"),  # type: ignore[arg-type]
@@ -347,7 +347,7 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     # --- explore, diagrams, the oracle ---
     "explore a graph": (lambda: explore(build()), f"{BUILDER}, for each run has a graph of"),  # type: ignore[arg-type]
     "explore a number": (lambda: explore(5), f"{BUILDER}, for each run has a graph of its o"),  # type: ignore[arg-type]
-    "explore what builds none": (lambda: explore(lambda: 5), "this one gave ba"),  # type: ignore[arg-type,return-value]
+    "explore what builds none": (lambda: explore(lambda: 5), "this one returned 5"),  # type: ignore[arg-type,return-value]
     "explore async": (lambda: explore(build_later), "this one is async: let a plain functio"),  # type: ignore[arg-type]
     "explore with arguments": (lambda: explore(build_with), "missing a required argument: '"),  # type: ignore[arg-type]
     "explore no runs": (lambda: explore(build, runs=0), "how many schedules to try, 1 at least, got 0"),

@@ -32,11 +32,11 @@ def side_by_side(plans: Sequence[GraphPlan]) -> GraphPlan:
     nodes: list[NodePlan] = []
     edges: list[EdgePlan] = []
     for number, plan in enumerate(plans):
-        assert plan == GraphPlan(plan.nodes, plan.edges), "only nodes and edges can be moved"
+        assert plan == GraphPlan(plan.nodes, plan.edges, library=plan.library), "only nodes and edges can be moved"
 
         def moved(end: tuple[str, str, str], number: int = number) -> tuple[str, str, str]:
             return (f"g{number}_{end[0]}" if end[0] else "", *end[1:])
 
         nodes += [replace(node, name=f"g{number}_{node.name}") for node in plan.nodes]
         edges += [replace(edge, source=moved(edge.source), target=moved(edge.target)) for edge in plan.edges]
-    return GraphPlan(tuple(nodes), tuple(edges))
+    return GraphPlan(tuple(nodes), tuple(edges), library=plans[0].library)
