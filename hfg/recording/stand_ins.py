@@ -57,7 +57,7 @@ def stand_in(old: Node, names: dict[str, str], hints: dict[str, Any], how: How) 
         "process": _process_waiting if waits else _process,
         "teardown": _teardown,
         # the effects of a slot are in the recording
-        "_slot_call": lambda self, name: lambda token: self._player.called(),
+        "_handler": lambda self, name: lambda *value: self._player.called(),
         "_made": lambda cls: _description(cls, old, waits=waits),
     }
     made: Any = types.new_class(qualname, (Node,), {"_made": body.pop("_made")}, lambda names: names.update(body))

@@ -28,7 +28,7 @@ def tab(command: Command, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
 
 
 def test_verbs_and_options(tab: Tab) -> None:
-    assert tab("hfg t") == ["tap", "top"]
+    assert tab("hfg t") == ["tap", "top", "trigger"]
     assert "--trace" in tab("hfg run steps.py --t")
 
 
