@@ -132,6 +132,8 @@ class FiringText(Facts):
         if self._gives_inside(k):
             say(f"m{k} = False")
         self._put(k, silent=True)
+        if self._odd_sending(k):
+            self.taps.emit()  # as the call does before it sends: the lines after both know nothing that is not told
         self._enable(k)
         if self._may_take(k):
             say(f"if w{k}.busy: region.finish({k})")
