@@ -158,6 +158,19 @@ def who_hears_that_it_was_processed() -> hfg.Graph:
     return graph
 
 
+@hfg.node
+async def rests(value: int) -> int:
+    return value
+
+
+def a_source_that_was_processed_before_async_code() -> hfg.Graph:
+    """Async members and those that announce do not go together, also where a source announces."""
+    graph = hfg.Graph()
+    chain(graph, rests(), forward())
+    graph.connect(graph["numbers"].processed, graph.add(Holds(), name="hears").begin)
+    return graph
+
+
 GRAPHS = {
     "an active member": an_active_member,
     "an open gate": a_gate(True),
@@ -182,6 +195,18 @@ def test_fused_it_does_what_single_firings_do(build: Callable[[], hfg.Graph], mo
     assert found[0] == found[1]
     firings = sum(node.firings for node in found[1][1].values())
     assert calls.fused > ALL_FUSED * firings
+
+
+@pytest.mark.rule("A9", "F9")
+def test_a_source_before_async_code_announces_each_firing(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = note_calls(monkeypatch)
+    build = a_source_that_was_processed_before_async_code
+    found = []
+    for fast in (False, True):
+        report = hfg.run(build(), clock="virtual", fast=fast)
+        found.append((calls.take()[0], report.nodes, report.edges))
+    assert found[0] == found[1]
+    assert found[1][1]["hears"].calls == WAVES
 
 
 @pytest.mark.rule("G2", "A9")

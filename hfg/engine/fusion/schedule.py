@@ -140,10 +140,14 @@ def _closure(head: RunningNode) -> set[RunningNode]:
     Async members and those that are alive do not go together: it is the async ones that stay outside.
     """
     inside = _found(head, lambda worker: True)
-    if any(worker.is_async for worker in inside) and any(is_alive(worker) and worker.in_edges for worker in inside):
-        alive = not head.is_async
-        inside = _found(head, lambda worker: not (worker.is_async if alive else is_alive(worker) and worker.in_edges))
+    if any(worker.is_async for worker in inside) and any(map(_fires_alive, inside)):
+        inside = _found(head, lambda worker: not (_fires_alive(worker) if head.is_async else worker.is_async))
     return inside
+
+
+def _fires_alive(worker: RunningNode) -> bool:
+    """Whether it is alive, and not only called; a source, which has no inputs, may announce its firings as well."""
+    return is_alive(worker) and bool(worker.in_edges or worker.is_source)
 
 
 def _found(head: RunningNode, fits: Callable[[RunningNode], bool]) -> set[RunningNode]:
