@@ -335,7 +335,10 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "fire a slot's wrong type": (lambda: fire(Count(), slot="start_at", value="a"), 'slot "count.start_at" is declare'),
     "fire a slot by name": (lambda: fire(Count(), slot="start_at", at=1), 'a slot takes value=..., got "at"'),
     "fire no hook": (lambda: fire(Count(), hook="stup"), '"stup" is not a hook of a node; did you mean "setup"?'),
-    "fire process as a hook": (lambda: fire(Count(), hook="process"), "is not a hook of a node: leave hook= out for a "),
+    "fire process as a hook": (
+        lambda: fire(Count(), hook="process"),
+        "is not a hook of a node: leave hook= out for a ",
+    ),
     "fire a hook it has not": (lambda: fire(Count(), hook="end"), 'count does not define "end", so there is nothing t'),
     "fire a hook with values": (lambda: fire(FailsEnd(), hook="end", value=1), 'hook "end" takes no values, got "valu'),
     "fire a hook that is none": (lambda: fire(Count(), hook=print), "is not a hook of a node"),  # type: ignore[arg-type]

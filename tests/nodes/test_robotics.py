@@ -181,6 +181,13 @@ def test_one_sighting_makes_nothing_known() -> None:
     assert fire(robotics.LandmarkMap(), seen=[Landmark("A", 1.0, 1.0)]).outputs["known"] == {}
 
 
+def test_a_landmark_of_which_nothing_is_known_is_left_out() -> None:
+    """A sigma whose square no float can hold says as much as none."""
+    sure = [Landmark("A", 1.0, 1.0)] * 3
+    found = fire(robotics.LandmarkMap(), seen=[*sure, Landmark("A", 9.0, 9.0, sigma=1e300)]).outputs["known"]
+    assert (found["A"].x, found["A"].y) == (1.0, 1.0)
+
+
 def test_a_path_goes_through_the_gap_and_ends_at_the_goal() -> None:
     costs = np.ones((40, 40))
     costs[20, :30] = np.inf

@@ -82,7 +82,8 @@ class LandmarkMixture:
           outliers: how many of the sightings belong to no place.
           area: over which those are spread, in square metres.
         """
-        at, variance = np.array([seen.x, seen.y]), max(seen.sigma, 1e-3) ** 2 + spread**2
+        at, sigma = np.array([seen.x, seen.y]), max(seen.sigma, 1e-3)
+        variance = sigma * sigma + spread * spread  # ** would raise where this is infinite
         if not (np.isfinite(at).all() and math.isfinite(variance)):
             return
         known = math.isfinite(seen.heading)
