@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -499,7 +500,7 @@ def answers(plan: GraphPlan) -> dict[str, int] | None:
 def lives(plan: GraphPlan) -> GraphPlan:
     """The same graph with something beside it that never ends and that nobody hears."""
     beside = (NodePlan("beside", "Watch", {"count": 10**6, "period_s": 0.013}), NodePlan("none", "Watch", {"count": 0}))
-    return GraphPlan((*plan.nodes, *beside), plan.edges, plan.boxes, plan.gates, plan.groups, plan.feeds)
+    return replace(plan, nodes=(*plan.nodes, *beside))
 
 
 @pytest.mark.slow
