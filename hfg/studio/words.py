@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from hfg.errors import shown
@@ -21,44 +21,42 @@ def in_words(commands: Sequence[c.Command]) -> str:
     return ", ".join(said[:_MOST_COMMANDS]) + (f" and {more} more" if more > 0 else "")
 
 
+_WORDS: Final[Mapping[type[c.Command], str]] = {
+    c.Add: "add {path} ({kind})",
+    c.AddSubgraph: "add subgraph {path}",
+    c.AddInput: "add the graph's input {name}",
+    c.AddOutput: "add the graph's output {name}",
+    c.AddGroup: "add group {name}",
+    c.ChangeGroup: "change group {name}",
+    c.RemoveGroup: "remove group {name}",
+    c.Copy: "copy {path} to {to}",
+    c.Rename: "rename {path} to {name}",
+    c.Move: "move {path} to group {group}",
+    c.SetParameter: "set {path} to {shown}",
+    c.Enclose: "put {first} into {name}",
+    c.Replace: "replace {path} by {kind}",
+    c.Gate: "gate {path} by {by}",
+    c.Connect: "connect {source} → {target}",
+    c.Disconnect: "disconnect {source} → {target}",
+    c.SetEdge: "change {source} → {target}",
+}
+"""What a command does, with its fields; those whose words depend on a value, and verbs of one path, are not here."""
+
+
 def _said(command: c.Command) -> str:
     match command:
-        case c.Add(path=path, type=type_):
-            return f"add {path} ({type_.rpartition(':')[2]})"
-        case c.AddSubgraph(path=path):
-            return f"add subgraph {path}"
-        case c.AddInput(name=name) | c.AddOutput(name=name):
-            return f"add the graph's {'input' if isinstance(command, c.AddInput) else 'output'} {name}"
-        case c.AddGroup(name=name):
-            return f"add group {name}"
-        case c.ChangeGroup(name=name):
-            return f"change group {name}"
-        case c.RemoveGroup(name=name):
-            return f"remove group {name}"
-        case c.Copy(path=path, to=to):
-            return f"copy {path} to {to}"
-        case c.Rename(path=path, name=name):
-            return f"rename {path} to {name}"
-        case c.Move(path=path, group=group):
-            return f"move {path} to group {group or 'of its surroundings'}"
-        case c.SetParameter(path=path, value=value):
-            return f"set {path} to {shown(value, _MOST_LETTERS)}"
         case c.Note(path=path, name=name):
             return f"place {path}" if name == "position" else f"note {name} of {path or 'the graph'}"
-        case c.Enclose(paths=paths, name=name):
-            return f"put {', '.join(paths[:_MOST_COMMANDS])} into {name}"
-        case c.Replace(path=path, type=type_):
-            return f"replace {path} by {type_.rpartition(':')[2]}"
-        case c.Gate(path=path, by=by):
-            return f"gate {path} by {by}"
         case c.Promote(path=path, inner=inner, promoted=promoted):
             return f"let {path} stand for {inner}" if promoted else f"let {path} no longer stand for {inner}"
         case c.MakeActive(source=source, target=target, active=active):
             return f"make {source} → {target} {'active' if active else 'inactive'}"
-        case c.Connect(source=source, target=target):
-            return f"connect {source} → {target}"
-        case c.Disconnect(source=source, target=target):
-            return f"disconnect {source} → {target}"
-        case c.SetEdge(source=source, target=target):
-            return f"change {source} → {target}"
-    return f"{type(command).__name__.lower()} {getattr(command, 'path', '')}".rstrip()
+    words = _WORDS.get(type(command))
+    if words is None:
+        return f"{type(command).__name__.lower()} {getattr(command, 'path', '')}".rstrip()
+    fields = {name: getattr(command, name) for name in command.__struct_fields__}
+    fields["kind"] = str(fields.get("type", "")).rpartition(":")[2]
+    fields["first"] = ", ".join(fields.get("paths", ())[:_MOST_COMMANDS])
+    fields["shown"] = shown(fields.get("value"), _MOST_LETTERS)
+    fields["group"] = fields.get("group") or "of its surroundings"
+    return words.format_map(fields)

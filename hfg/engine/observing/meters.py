@@ -1,19 +1,19 @@
 """What measures the code of running nodes: it wraps the code, and the rest of the engine does not know.
 
 Of a node that is very fast only some firings between two looks are measured and stand for the others, so that measuring
-costs next to nothing; all are counted. Stands on `running_node`.
+costs next to nothing; all are counted. Stands on `running_node` and `stepping`.
 """
 
 from __future__ import annotations
 
-import types
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Coroutine, Generator, Iterator
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from math import frexp, ldexp
 from time import monotonic
 from types import CoroutineType
 from typing import Any
 
+from hfg.base.stepping import measured_steps
 from hfg.engine.model.running_node import RunningNode
 
 __all__ = ["BATCH", "KEPT", "Distribution", "Meter"]
@@ -232,7 +232,7 @@ class Meter:
         """Await code that waits; only its own steps keep the group busy."""
         busy = [0.0]
         try:
-            return await _stepped(coroutine, busy)
+            return await measured_steps(coroutine, busy, monotonic)
         finally:
             self.took(monotonic() - began, None if stamp is None else self._now() - stamp, busy[0])
 
@@ -241,29 +241,6 @@ class Meter:
 
     def _drawn(self, generator: Any) -> Any:
         return _AsyncDrawn(self, generator) if hasattr(generator, "__anext__") else _Drawn(self, generator)
-
-
-@types.coroutine
-def _stepped(coroutine: Any, busy: list[float]) -> Generator[Any, Any, Any]:
-    """Await a coroutine, measuring its steps only: while it waits, others run."""
-    value: Any = None
-    error: BaseException | None = None
-    while True:
-        began = monotonic()
-        try:
-            waits_for = coroutine.send(value) if error is None else coroutine.throw(error)
-        except StopIteration as over:
-            return over.value
-        finally:
-            busy[0] += monotonic() - began
-        value = error = None
-        try:
-            value = yield waits_for
-        except GeneratorExit:
-            coroutine.close()
-            raise
-        except BaseException as thrown:
-            error = thrown
 
 
 class _Drawn(Iterator[Any]):
