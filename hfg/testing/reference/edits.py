@@ -170,6 +170,7 @@ class Editing(Calling):
             self.now = due
             self.loop.ring()
         self.now = now
+        self.loop.ring()  # what is due at this very moment may move now, without more time passing
         if not self.is_enabled(station.leaf.index):  # they last as long as that (F10)
             self.cancel_tasks(station)
 
