@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -402,3 +402,20 @@ def test_taps_see_the_same_tokens_in_fused_regions(fuse_after: int, monkeypatch:
         silent = path != "script.out"
         assert values == [None if silent and number % 2 else factor * number for number in range(40)]
         assert tokens[-1].value is hfg.END
+
+
+@hfg.node
+async def ends_later() -> AsyncIterator[int]:
+    """Give one value, and end after its code has let others go on."""
+    yield 1
+    await asyncio.sleep(0)
+
+
+@pytest.mark.rule("F7", "R6")
+@pytest.mark.parametrize(("source", "waited"), [(ends_later, True), (camera, None)])
+def test_an_end_says_whether_the_source_had_waited_before_it(tmp_path: Path, source: Any, waited: bool | None) -> None:
+    graph = hfg.Graph("ends")
+    graph.add(source(), name="source") >> graph.add(show())
+    recorded(graph, tmp_path / "run.mcap")
+    ends = [body.get("waited") for topic, _, body in messages(tmp_path / "run.mcap") if topic == "hfg/markers"]
+    assert ends == [waited]
