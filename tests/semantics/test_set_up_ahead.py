@@ -230,3 +230,11 @@ def test_an_edit_that_fails_leaves_nothing_of_what_its_nodes_have_said() -> None
 def test_what_an_edge_refuses_that_was_said_ahead_fails_as_in_setup() -> None:
     with pytest.raises(hfg.errors.NodeError, match=r'"says".*setup\(\).*queue of "says.said -> busy.value" is full'):
         edited(graph(), ADD[0], WAITS, c.Connect("says.said", "busy.value", overflow="error", capacity=1))
+
+
+@pytest.mark.rule("F10", "R4")
+def test_tasks_of_a_replacement_of_a_disabled_node_end_with_its_setup() -> None:
+    made = graph(says=True, enabled=False)
+    trace = edited(made, c.Replace("says", f"{HERE}:Ticks"))
+    assert came(trace) == []
+    assert not [one for one in trace if isinstance(one, EventTriggered) and one.time > begun(trace)]

@@ -264,7 +264,6 @@ class Edits:
         engine, how = self._engine, edit.how
         assert self._index is not None
         new, nodes = apply(engine.core, self._index, self._graph, how, edit.come, engine.groups)
-        node_lifecycle.end_tasks(edit.come)
         for edge, flat in new:
             if flat.source.kind == "observable":
                 self._lifecycle.feed(flat.source.port, edge, flat.options.through)
@@ -354,7 +353,6 @@ def _stay_disabled(fresh: Iterable[RunningNode]) -> None:
     """Nodes that were set up to be enabled, and are not: what they send goes nowhere, and their tasks end (F10)."""
     for worker in fresh:
         node_lifecycle.take_part(worker)
-        node_lifecycle.end_tasks((worker,))
 
 
 def _refuse_for_good(change: Change) -> None:

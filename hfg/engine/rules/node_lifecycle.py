@@ -132,10 +132,11 @@ def set_up(worker: RunningNode, then: Then) -> None:
 def take_part(worker: RunningNode) -> None:
     """Let a node that was set up ahead take part: its signals since then leave now instead of being lost (R4, F10).
 
-    A signal that an edge refuses (P5) is an error of `setup()`.
+    A signal that an edge refuses (P5) is an error of `setup()`. If the node is disabled, its tasks end with its setup.
     """
     if worker.lifecycle.early is None:
         return
+    end_tasks((worker,))
     kept = worker.lifecycle.take_part()
     worker.core.rules.bind_ports(worker)
     try:

@@ -112,6 +112,7 @@ class Editing(Calling):
         self._silence_those_that_rest_now(enabled)
         for station in self.stations:
             self._process_what_is_pipelined_now(station)
+        self.settle()  # the change itself comes before what its nodes say
         for station in self.stations:
             self._take_part(station)
 
@@ -336,16 +337,18 @@ class Editing(Calling):
                     self.observe(ParameterSet(self.now, self.path_of(owner), change.name, change.after))
 
     def _process_what_is_pipelined_now(self, station: Station) -> None:
-        """In its new group a node's mode may be another (F5)."""
+        """In its new group a node's mode may be another, for what it has taken by firings and calls (F5, F6)."""
         owed, station.owed = station.owed, []
         for line in owed:
             if self.is_pipelined(line):
                 self.process(line)
             else:
                 station.owed.append(line)
-        for line in [line for flight in station.flights for line in flight.taken]:
-            if self.is_pipelined(line):
-                self.process(line)
+        for flight in station.flights:
+            called = [] if flight.line is None or flight.line.edge.is_event else [flight.line]
+            for line in (*flight.taken, *called):
+                if self.is_pipelined(line):
+                    self.process(line)
 
 
 def _is_switch(change: OptionsChange) -> bool:
