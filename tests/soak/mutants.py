@@ -17,6 +17,13 @@ _LOOKING: Final = ("tests/recording/test_fused.py", "-k", "not random")
 _BOUNDED: Final = ("tests/links/test_bounded.py",)
 _EXACT: Final = ("tests/links/test_exact.py",)
 
+# The generators, which must find again what people once found.
+_GRAPHS: Final = ("tests/semantics/test_random_graphs.py", "-k", "oracle_permits")
+_FUSED: Final = ("tests/semantics/test_fused.py", "-k", "fused_interpreted_and_watched")
+_PROCESSES: Final = ("tests/parts/test_cut_in_processes.py",)
+_DEATHS: Final = ("tests/parts/test_losses_at_random.py",)
+_PLAYED: Final = ("tests/recording/test_playing.py", "-k", "recorded_on_the_real_clock")
+
 
 class Mutant(NamedTuple):
     """A fault.
@@ -375,5 +382,53 @@ MUTANTS: Final = (
         "bounded",
         'if self._overflow == "drop_newest":',
         'if self._overflow == "newest":',
+    ),
+    Mutant(
+        "an async member that sends after an await is not known to be the one whose call is under way",
+        "F3",
+        "hfg/engine/fusion/region.py",
+        "return self.running and self.at_work(sys._getframe(1)) is worker",
+        "return False and self.at_work(sys._getframe(1)) is worker",
+        _FUSED,
+    ),
+    Mutant(
+        "data overtakes start on its way to another process",
+        "A10",
+        "hfg/engine/runtime/borders.py",
+        "if core.over or not core.started:",
+        "if core.over:",
+        _PROCESSES,
+    ),
+    Mutant(
+        "an artificial deadlock is resolved only when nothing else is alive",
+        "F8",
+        "hfg/engine/runtime/engine.py",
+        "        if core.suspects or core.all_suspect:\n            rings.resolve(core)\n",
+        "",
+        _GRAPHS,
+    ),
+    Mutant(
+        "a value that raises when it is looked at escapes from the check of its type",
+        "X1",
+        "hfg/types.py",
+        "        return fits(value)\n    except Exception:",
+        "        return fits(value)\n    except KeyError:",
+        _FUSED,
+    ),
+    Mutant(
+        "nothing takes the place of what is lost with a process, so joins pair the wrong tokens",
+        "L2",
+        "hfg/parts/running/part.py",
+        "return [((NO_MESSAGE, 0, stamp), (stream, number)) for number in numbers]",
+        "return []",
+        _DEATHS,
+    ),
+    Mutant(
+        "a firing with two outputs that was recorded on the real clock is played as two",
+        "F3",
+        "hfg/recording/tracks.py",
+        "if at_once and record.when != self.when:",
+        "if record.when != self.when:",
+        _PLAYED,
     ),
 )
