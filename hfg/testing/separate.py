@@ -13,13 +13,14 @@ import ctypes
 import os
 import platform
 import resource
+import selectors
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from typing import Any, Final, TypeVar
@@ -41,6 +42,7 @@ _HEAP: Final = (
 
 _FILE_BYTES: Final = 64 << 20
 _IMPORT_S: Final = 120.0
+_LOOKS_S: Final = 0.05
 _WITH_PARENT: Final = 1  # PR_SET_PDEATHSIG of Linux
 
 T = TypeVar("T", bound=msgspec.Struct)
@@ -176,20 +178,31 @@ def forked(
 
 def _waited(process: int, patience_s: Callable[[int], float], progress: Callable[[], int]) -> int | float:
     """Wait for a process. Return its exit code, or as a float the patience after which it was stopped."""
-    last, since, pause_s = -1, time.monotonic(), 0.001
-    while True:
-        done, status = os.waitpid(process, os.WNOHANG)
-        if done:
-            return os.waitstatus_to_exitcode(status)
-        now = progress()
-        if now != last:
-            last, since = now, time.monotonic()
-        elif time.monotonic() - since > patience_s(now):
-            os.kill(process, signal.SIGKILL)
-            os.waitpid(process, 0)
-            return float(patience_s(now))
-        time.sleep(pause_s)
-        pause_s = min(0.05, 2 * pause_s)
+    last, since = -1, time.monotonic()
+    with _ends_of(process) as ended:
+        while True:
+            done, status = os.waitpid(process, os.WNOHANG)
+            if done:
+                return os.waitstatus_to_exitcode(status)
+            now = progress()
+            if now != last:
+                last, since = now, time.monotonic()
+            elif time.monotonic() - since > patience_s(now):
+                os.kill(process, signal.SIGKILL)
+                os.waitpid(process, 0)
+                return float(patience_s(now))
+            ended.select(_LOOKS_S)
+
+
+@contextlib.contextmanager
+def _ends_of(process: int) -> Iterator[selectors.BaseSelector]:
+    """Yield a selector that is ready as soon as a process has ended, where the system can tell; else after its time."""
+    with selectors.DefaultSelector() as selector, contextlib.ExitStack() as stack:
+        if hasattr(os, "pidfd_open"):
+            handle = os.pidfd_open(process)
+            stack.callback(os.close, handle)
+            selector.register(handle, selectors.EVENT_READ)
+        yield selector
 
 
 def _confine(errors: int, memory_bytes: int) -> None:

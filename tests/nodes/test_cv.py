@@ -682,10 +682,17 @@ WITH_NAN = np.where(np.eye(6, 5) > 0, np.nan, FEW).astype(np.float32)
             {"src": FEW, "mask": np.ones((2, 2), np.uint8)},
             "normalize: src is 6 x 5 and mask 2 x 2; they have one size",
         ),
+        (cv.invert(flags="SVD"), {"src": np.array([[1, 2], [3, np.inf]])}, "invert: src has NaN or infinity"),
+        (cv.sv_decomp(), {"src": np.array([[1, 2], [-np.inf, 4]])}, "sv_decomp: src has NaN or infinity"),
+        (
+            cv.pow(power=-1.0),
+            {"src": np.full((2, 2), -(2**31), np.int32)},
+            "pow: src has -2,147,483,648, which int32 cannot negate; clip it, or convert src to float64",
+        ),
         (cv.check_range(), {"a": np.ones((4, 4), np.float16)}, 'input "a" of check_range: expected Array['),
     ],
 )
-def test_values_that_end_the_process_are_refused(node: Any, given: Any, sentence: str) -> None:
+def test_values_that_end_the_process_or_hold_it_forever_are_refused(node: Any, given: Any, sentence: str) -> None:
     with pytest.raises((ValueError, TypeError), match=re.escape(sentence)):
         fire(node, debug=False, **given)
 

@@ -1082,6 +1082,14 @@ def _power_fits(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str
     return f"the power {power:g} needs an array of float32 or float64; {inputs['src'].dtype} takes whole powers only"
 
 
+def _has_an_absolute_value(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    """For a negative power OpenCV looks the absolute value up in a table, and -2 ** 31 of int32 has none."""
+    array = inputs["src"]
+    if parameters["power"] >= 0 or array.dtype != np.int32 or array.size == 0 or array.min() > -(2**31):
+        return None
+    return "src has -2,147,483,648, which int32 cannot negate; clip it, or convert src to float64, for a negative power"
+
+
 def _maps_are_alike(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
     first, second = inputs["map1"], inputs.get("map2")
     if second is None or first.shape[:2] == second.shape[:2]:
@@ -1189,6 +1197,7 @@ _NEEDED: Final[tuple[tuple[str, Need], ...]] = (
     ),
     ("dilate erode morphologyEx", Need("the work would not end", _work_ends)),
     ("pow", Need("the array is of integers and the power is no whole number", _power_fits)),
+    ("pow", Need("the power is negative and an array of int32 has -2,147,483,648", _has_an_absolute_value)),
     ("imdecode", Need("the picture has more pixels than HFG_MOST_PICTURE_PIXELS, 134,217,728", _picture_is_fair)),
     ("convertMaps", Need("the maps have two sizes", _maps_are_alike)),
     ("drawChessboardCorners", Need("a board that was found has more or fewer corners", _corners_fill_the_board)),
@@ -1200,6 +1209,7 @@ _NEEDED: Final[tuple[tuple[str, Need], ...]] = (
     ("validateDisparity", Need("there are disparities outside of their range", _disparities_are_of_the_range)),
     ("eigenNonSymmetric", _finite("src")),
     ("filter2D", _finite("kernel")),
+    ("invert SVDecomp", _finite("src")),
     ("findContours", Need("an image of int32 has a number that is not within 0 and 2 ** 29", _labels_are_few)),
     ("sepFilter2D", _finite("kernelX", "kernelY")),
 )
