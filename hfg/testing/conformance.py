@@ -302,7 +302,8 @@ class Replay:
         if self.expected:
             raise Divergence("the run went on before all of the last decision was done", event, self)
         self._end_rest(event.node)
-        self._end_tasks(event.node)
+        if not (isinstance(event, CallStarted) and event.slot in ("enable", "reset")):  # which wait for them (F10)
+            self._end_tasks(event.node)
         for move in self.machine.moves():
             fires = move.kind == "fire" and isinstance(event, FiringStarted)
             calls = move.kind == "call" and isinstance(event, CallStarted) and move.edge == event.edge

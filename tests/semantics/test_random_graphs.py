@@ -111,6 +111,13 @@ def test_so_it_does_with_all_in_which_something_was_wrong_once(block: int) -> No
             check(plan, seed)
 
 
+@pytest.mark.rule("F10", "X1")
+def test_a_node_that_is_enabled_while_its_cancelled_tasks_end_takes_its_time() -> None:
+    plan = random_plan(790000422, replace(Allowed(), max_nodes=5, tasks=True, sending=True, doing=True, rings=True))
+    assert reference(plan, 790000422) is not None
+    check(plan, 790000422)
+
+
 def has_several_at_once(plan: GraphPlan) -> bool:
     return any("concurrency" in node.options for node in plan.nodes)
 

@@ -149,12 +149,25 @@ class Exits(Turns):
             else:
                 self.order[j].counts.add_firings(1)
             for edge, output, to in self.schedule.outs[j]:
-                if to is None or (to >= k + amid and not edge.live):  # one end was disabled meanwhile: F10
+                if to is None:
                     continue
                 edge.sent += 1
-                if to >= k + amid and not self._lay(edge, to, found.get(f"v{j}_{output}"), stamp):
+                value = found.get(f"v{j}_{output}")
+                if to < k + amid:
+                    continue
+                if not edge.live:
+                    self._discard(edge, to, value, lies=edge.active and bool(found.get(f"m{j}")))
+                elif not self._lay(edge, to, value, stamp):
                     silent_calls.add(edge)
         self._write_barriers(k, silent_calls)
+
+    def _discard(self, edge: SyncEdge, to: int, value: object, *, lies: bool) -> None:
+        """One end of the edge was disabled behind the sending, which discards what was sent, and counts it (F10).
+
+        A marker into a slot was processed at once (T4); what `lies` there with activity was discarded by the rules.
+        """
+        if not lies and (value is not None or to not in self.schedule.called):
+            edge.count_dropped()
 
     def _lay(self, edge: SyncEdge, to: int, value: object, stamp: float) -> bool:
         """Put what a local holds on the edge to member `to`; a slot is not called by a marker (T4)."""
