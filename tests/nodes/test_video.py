@@ -312,6 +312,9 @@ def test_an_object_is_followed_from_where_it_was_said_to_be() -> None:
     assert abs(y - 40) <= 8
     fire(node, slot="stop")
     assert fire(node, image=picture(8)).outputs == {}
+    fire(node, slot="start", value=(3, 8, 8, 2))  # OpenCV would look for features in it for ever
+    with pytest.raises(ValueError, match=r"the object \(3, 8, 8, 2\) has 16 pixels; it needs 32"):
+        fire(node, image=picture(0))
     fire(node, slot="start", value=(150, 40, 32, 32))
     with pytest.raises(ValueError, match=r"the object \(150, 40, 32, 32\) does not lie in a picture of"):
         fire(node, image=picture(0))

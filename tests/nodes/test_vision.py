@@ -269,9 +269,10 @@ def test_a_text_with_half_of_a_character_is_refused_and_does_not_end_the_process
         fire(video.WriteVideo(path="a\udcff.avi"), image=np.zeros((8, 8), np.uint8))
 
 
-def test_pictures_that_are_too_small_for_native_code_are_refused() -> None:
-    with pytest.raises(ValueError, match="AKAZE needs a picture of at least two rows"):
-        fire(vision.KeypointDetector(method="AKAZE"), image=np.zeros((1, 40), np.uint8))
+@pytest.mark.parametrize("method", ["AKAZE", "KAZE"])
+def test_pictures_that_are_too_small_for_native_code_are_refused(method: str) -> None:
+    with pytest.raises(ValueError, match=f"{method} needs a picture of at least two rows"):
+        fire(vision.KeypointDetector(method=method), image=np.zeros((1, 40), np.uint8))
 
 
 def test_a_video_that_is_too_narrow_is_refused(tmp_path: Path) -> None:

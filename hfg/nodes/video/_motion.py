@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 import cv2
 import numpy as np
@@ -24,6 +24,9 @@ __all__ = [
     "PointTracker",
     "RunningMean",
 ]
+
+_LEAST_OBJECT: Final = 32
+"""Pixels: in one of fewer, OpenCV draws features at random, for ever if none has room (measured up to 16)."""
 
 Tracked = Annotated[npt.NDArray[np.float32], Rows(2), Named("Corners")]
 
@@ -275,7 +278,7 @@ class ObjectTracker(Node):
 
     Raises:
       TypeError: the picture is not of 8 bits.
-      ValueError: the picture is empty, or the object does not lie in it.
+      ValueError: the picture is empty, or the object does not lie in it or has fewer than 32 pixels.
     """
 
     image = Input(Picture)
@@ -302,6 +305,8 @@ class ObjectTracker(Node):
             x, y, width, height = self.begin
             if x < 0 or y < 0 or width < 2 or height < 2 or x + width > image.shape[1] or y + height > image.shape[0]:
                 raise ValueError(f"the object {self.begin} does not lie in a picture of {image.shape}")
+            if width * height < _LEAST_OBJECT:
+                raise ValueError(f"the object {self.begin} has {width * height} pixels; it needs {_LEAST_OBJECT}")
             self.tracker, self.begin = cv2.TrackerMIL.create(), None
             self.tracker.init(colour(image), (x, y, width, height))
             return x, y, width, height

@@ -38,7 +38,7 @@ class KeypointDetector(Node):
 
     Raises:
       TypeError: the picture or the mask is not of 8 bits.
-      ValueError: the picture is empty or has two channels, or only one row for AKAZE; or the mask is of another size.
+      ValueError: the picture is empty or has two channels, or only one row for AKAZE and KAZE; or the mask is of another size.
 
     CS::APEX: csapex::ExtractKeypoints, csapex::ExtractDescriptors.
     """
@@ -61,8 +61,8 @@ class KeypointDetector(Node):
             need_picture(self, mask, Mask, "mask")
             if mask.shape[:2] != image.shape[:2]:
                 raise ValueError(f"the mask is as large as the picture, {image.shape[:2]}, got one of {mask.shape[:2]}")
-        if self.method == "AKAZE" and image.shape[0] < 2:  # OpenCV writes beyond its memory
-            raise ValueError("AKAZE needs a picture of at least two rows, got one of one row")
+        if self.method in ("AKAZE", "KAZE") and image.shape[0] < 2:  # OpenCV reads and writes beyond its memory
+            raise ValueError(f"{self.method} needs a picture of at least two rows, got one of one row")
         if self.made_of != (self.method, self.most):
             self.detector, self.made_of = self._make(), (self.method, self.most)
         try:
