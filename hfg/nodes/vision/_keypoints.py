@@ -38,7 +38,7 @@ class KeypointDetector(Node):
 
     Raises:
       TypeError: the picture or the mask is not of 8 bits.
-      ValueError: the picture is empty or has two channels, or only one row for AKAZE and KAZE; or the mask is of another size.
+      ValueError: the picture is empty or has two channels, or one row for AKAZE and KAZE; or the mask has another size.
 
     CS::APEX: csapex::ExtractKeypoints, csapex::ExtractDescriptors.
     """

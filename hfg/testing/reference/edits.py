@@ -337,7 +337,7 @@ class Editing(Calling):
                     self.observe(ParameterSet(self.now, self.path_of(owner), change.name, change.after))
 
     def _process_what_is_pipelined_now(self, station: Station) -> None:
-        """In its new group a node may have another mode, also of what its firings and calls have taken (F5, F6)."""
+        """A new group may change the mode of a node, including the one for tokens it has already taken (F5, F6)."""
         owed, station.owed = station.owed, []
         for line in owed:
             if self.is_pipelined(line):
