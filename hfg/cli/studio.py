@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import html
+import tempfile
 import threading
 import webbrowser
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -85,11 +88,11 @@ def _serve(made: Studio, options: Mapping[str, Any], browser: bool, *, at_once: 
         server = Server(StudioDoor(asyncio.get_running_loop(), made), **options)
         server.start()
         threading.Thread(target=warm_up, name="hfg studio palette", daemon=True).start()
-        _show(server.address, browser)
         try:
-            if at_once:
-                await made.steering.start(stay=False)
-            await asyncio.Event().wait()
+            with _shown(server.address, browser):
+                if at_once:
+                    await made.steering.start(stay=False)
+                await asyncio.Event().wait()
         finally:
             await made.close()
             await server.stop()
@@ -97,10 +100,21 @@ def _serve(made: Studio, options: Mapping[str, Any], browser: bool, *, at_once: 
     return _until_interrupted(main)
 
 
-def _show(address: str, browser: bool) -> None:
+@contextlib.contextmanager
+def _shown(address: str, browser: bool) -> Iterator[None]:
+    """Write the address, and open it in the browser.
+
+    All users of the computer can read the command line of the browser, and the address holds the token. So the browser
+    is given a page in a private folder that leads there.
+    """
     show.write(f"{address}\n")
-    if browser:
-        webbrowser.open(address)
+    with contextlib.ExitStack() as stack:
+        if browser:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="hfg-studio-"))
+            page = Path(folder) / "open.html"
+            page.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={html.escape(address)}">\n')
+            webbrowser.open(page.as_uri())
+        yield
 
 
 def _attach(name: str, target: str | None, options: Mapping[str, Any], browser: bool, *, read_only: bool) -> int:
@@ -118,9 +132,9 @@ def _attach(name: str, target: str | None, options: Mapping[str, Any], browser: 
     async def main() -> None:
         server = Server(AttachedDoor(there[0].name), **options)
         server.start()
-        _show(server.address, browser)
         try:
-            await asyncio.Event().wait()
+            with _shown(server.address, browser):
+                await asyncio.Event().wait()
         finally:
             await server.stop()
 

@@ -1,4 +1,7 @@
-"""The server's thread: its loop is not the graph's, so neither waits for the other. Depends on uvicorn and `web`."""
+"""The server's thread: its loop is not the graph's, so neither waits for the other.
+
+Depends on uvicorn, `crowding` and `web`.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ import uvicorn
 
 from hfg.errors import TargetError
 from hfg.studio.cookies import forget_secret, secret_of_port
+from hfg.studio.crowding import bounded_http
 from hfg.studio.entrance import Entrance, need_guarded
 from hfg.studio.messages import LONGEST, FromPage, read
 from hfg.studio.studio import Studio
@@ -120,6 +124,7 @@ class Server:
 def _config(app: Any, certfile: str | None, keyfile: str | None) -> uvicorn.Config:
     return uvicorn.Config(
         app,
+        http=bounded_http(),
         ws="websockets-sansio",
         ws_max_size=LONGEST,
         ws_ping_interval=20.0,

@@ -6,6 +6,7 @@ Depends on starlette and `entrance`; knows of the studio only how to enter it.
 from __future__ import annotations
 
 import asyncio
+import html
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable, MutableMapping
@@ -15,7 +16,7 @@ from typing import Any, Final, Protocol
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
-from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Mount, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
@@ -153,7 +154,9 @@ class _Guard:
             return
         answer: Any = self._app if refusal is None else PlainTextResponse(refusal[1] + "\n", refusal[0])
         if refusal is None and "token" in connection.query_params:
-            answer = RedirectResponse(connection.url.path, 303, {"set-cookie": self._entrance.set_cookie})
+            # After a redirect the browser would keep the cookie back (SameSite=Strict), because a file has led here.
+            leads = f'<!doctype html><meta http-equiv="refresh" content="0; url={html.escape(connection.url.path)}">'
+            answer = HTMLResponse(leads, 200, {"set-cookie": self._entrance.set_cookie})
 
         async def with_headers(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":

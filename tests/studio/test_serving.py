@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import httpx2
 import pytest
@@ -20,6 +21,7 @@ import websockets
 
 import hfg
 from hfg.errors import TargetError
+from hfg.studio.crowding import MOST_CONNECTIONS
 from hfg.studio.messages import SUBPROTOCOL
 from hfg.studio.serving import Server, StudioDoor
 from tests.limits import patience
@@ -95,6 +97,25 @@ def test_the_graph_goes_on_while_a_page_reads_nothing() -> None:
                     await run.trigger("clock.tick", value)
                 await run.wait_quiet()
                 assert run.graph["count"].calls == 2000
+            await page.close()
+
+    live(main)
+
+
+@pytest.mark.slow
+@pytest.mark.rule("L5")
+def test_connections_that_send_nothing_give_way_to_a_page_and_are_few() -> None:
+    async def main() -> None:
+        async with hfg.running(ticking()) as run:
+            page = run.studio()
+            port = urlsplit(page.address).port
+            crowd = [await asyncio.open_connection("127.0.0.1", port) for _ in range(3 * MOST_CONNECTIONS)]
+            async with await come_in(page.address) as socket:
+                assert (await until(socket, "hello"))["boot"]
+                gone = [await reader.read() for reader, _ in crowd[: 2 * MOST_CONNECTIONS]]
+                assert not any(gone)
+            for _, writer in crowd:
+                writer.close()
             await page.close()
 
     live(main)
