@@ -1,6 +1,6 @@
-"""Connections that hold no page: at most so many at a time, so that nobody takes all file handles of the run (L5).
+"""Limits the connections that hold no page, because each takes a file handle of the run (L5).
 
-Whoever reaches the port can connect before the token is asked for. A browser sends its request at once, so the oldest
+A program of any user can connect before it is asked for the token. A browser sends its request at once, so the oldest
 connection gives way to a new one. Depends on uvicorn.
 """
 
