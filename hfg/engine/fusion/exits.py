@@ -6,11 +6,13 @@ under way is finished as any other. Stands on `turns`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import CodeType, CoroutineType
 from typing import Any
 
 from hfg.base.token import NO_MESSAGE, Token
 from hfg.engine.fusion.binding import Wave
+from hfg.engine.fusion.schedule import Turn
 from hfg.engine.fusion.tap_writing import emit_rest
 from hfg.engine.fusion.turns import Turns
 from hfg.engine.model.running_node import RunningNode
@@ -59,9 +61,10 @@ class Exits(Turns):
     def stop(self, p: int, found: dict[str, Any]) -> None:
         """Something has come up before the turn of member p: nobody is amid a firing."""
         self._rest()
-        self._go_by_rules(p, found)
+        turns = (*self.schedule.between.get(p, ()), (self.order[p], None), *self.schedule.behind[p])
+        self._go_by_rules(p, found, turns)
         self.core.running_node = None
-        self.queue_turns((*self.schedule.between.get(p, ()), (self.order[p], None), *self.schedule.behind[p]))
+        self.queue_turns(turns)
         self._let_go()
         self._left()
 
@@ -117,7 +120,7 @@ class Exits(Turns):
 
     def materialise(self, k: int, found: dict[str, Any]) -> RunningNode:
         """Members before k have fired and k is amid its firing: let the interpreted way see it so."""
-        self._go_by_rules(k, found, amid=True)
+        self._go_by_rules(k, found, self.schedule.behind[k], amid=True)
         worker, stamp = self.order[k], found["stamp"]
         if k in self.schedule.called:
             worker.begin_call(worker.slot_edges[0], stamp)
@@ -135,14 +138,22 @@ class Exits(Turns):
             agenda.consider(self.head)
             release(self.held_entries)
 
-    def _go_by_rules(self, k: int, found: dict[str, Any], *, amid: bool = False) -> None:
-        """Write down what lies where when members before k have fired; `amid`: k has taken what lay before it."""
+    def _go_by_rules(self, k: int, found: dict[str, Any], turns: Sequence[Turn], *, amid: bool = False) -> None:
+        """Write down what lies where when members before k have fired.
+
+        Args:
+          k: the member.
+          found: the locals of the wave.
+          turns: whose turns may come now.
+          amid: k has taken what lay before it.
+        """
         self.waves += found["done"]
         self.settle_counts()
         emit_rest(self._wave.untold.get(k, ()) if amid else (), found, self.core.now)
         self.armed = self.running = self.called_off = False
         stamp = found["stamp"]
         silent_calls: set[SyncEdge] = set()
+        disabled = False
         for j in range(k):
             if j in self.schedule.called:  # its silence is counted already
                 self.order[j].counts.add_calls(1)
@@ -156,10 +167,15 @@ class Exits(Turns):
                 if to < k + amid:
                     continue
                 if not edge.live:
+                    disabled = True
                     self._discard(edge, to, value, lies=edge.active and bool(found.get(f"m{j}")))
                 elif not self._lay(edge, to, value, stamp):
                     silent_calls.add(edge)
         self._write_barriers(k, silent_calls)
+        if disabled:  # by which a member behind the disabled one may have all that it waits for
+            for worker in self.order[k + amid :]:
+                if (worker, None) not in turns:
+                    agenda.consider(worker)
 
     def _discard(self, edge: SyncEdge, to: int, value: object, *, lies: bool) -> None:
         """One end of the edge was disabled behind the sending, which discards what was sent, and counts it (F10).
