@@ -7,7 +7,7 @@ connection gives way to a new one. Depends on uvicorn.
 from __future__ import annotations
 
 import asyncio
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from typing_extensions import override
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -26,8 +26,8 @@ def bounded_http(most: int = MOST_CONNECTIONS) -> type[H11Protocol]:
         """HTTP, until the connection becomes a WebSocket."""
 
         @override
-        def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-            super().connection_made(transport)
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            super().connection_made(cast("asyncio.Transport", transport))
             waiting[self] = None
             if len(waiting) > most:
                 oldest = next(iter(waiting))

@@ -137,6 +137,7 @@ MUTANTS: Final = (
         "firing_text",
         'asked = " or ".join(f"{token}.activity" for token in tokens)',
         'asked = "False"',
+        _FUSED,
     ),
     _fused(
         "whom a buffer has enabled does not go before the next wave",
@@ -180,7 +181,7 @@ MUTANTS: Final = (
         "wave_state",
         "edge.unprocessed = edge.live and (to >= k or not done[to]) and edge not in silent_calls",
         "edge.unprocessed = edge.live and to >= k and edge not in silent_calls",
-        _SENDING,
+        _FUSED,
     ),
     _fused(
         "what the head took is released though its outputs are not free",
@@ -188,6 +189,7 @@ MUTANTS: Final = (
         "region",
         "        if head.outputs.missing:\n            head.hold(self.held_entries)\n        elif self.held_entries:\n",
         "        if self.held_entries:\n",
+        _FUSED,
     ),
     _fused(
         "silences behind a silence are not counted",

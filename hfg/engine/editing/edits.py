@@ -8,7 +8,7 @@ then each edit would stop a robot that has nothing to do with it.
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Collection, Iterable, Sequence, Set
+from collections.abc import Awaitable, Callable, Collection, Sequence, Set
 from functools import partial
 from types import ModuleType
 from typing import Any
@@ -193,7 +193,8 @@ class Edits:
         except BaseException:
             if not edit.took_effect:
                 undo_all([change for change in changes if change not in edit.values])
-                _stay_disabled(edit.fresh)
+                for worker in edit.fresh:  # it stays disabled: what it sends goes nowhere, and its tasks end (F10)
+                    node_lifecycle.take_part(worker)
                 self.lock.wait_for(edit.come)
                 await self._hooks.to_its_end(self._hooks.tear_down(edit.come))
             raise
@@ -347,12 +348,6 @@ def _take_values(edit: _Following) -> None:
             copy = change.copy
             if (copy, name) not in said and value is not before[name] and same(copy._parameters[name], before[name]):
                 write_parameter(copy, name, value)
-
-
-def _stay_disabled(fresh: Iterable[RunningNode]) -> None:
-    """Nodes that were set up to be enabled, and are not: what they send goes nowhere, and their tasks end (F10)."""
-    for worker in fresh:
-        node_lifecycle.take_part(worker)
 
 
 def _refuse_for_good(change: Change) -> None:

@@ -6,13 +6,11 @@ under way is finished as any other. Stands on `turns`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import CodeType, CoroutineType
 from typing import Any
 
 from hfg.base.token import NO_MESSAGE, Token
 from hfg.engine.fusion.binding import Wave
-from hfg.engine.fusion.schedule import Turn
 from hfg.engine.fusion.tap_writing import emit_rest
 from hfg.engine.fusion.turns import Turns
 from hfg.engine.model.running_node import RunningNode
@@ -61,11 +59,10 @@ class Exits(Turns):
     def stop(self, p: int, found: dict[str, Any]) -> None:
         """Something has come up before the turn of member p: nobody is amid a firing."""
         self._rest()
-        turns = (*self.schedule.between.get(p, ()), (self.order[p], None), *self.schedule.behind[p])
-        self._go_by_rules(p, found, turns)
+        self._go_by_rules(p, found)
         self.core.running_node = None
-        self.queue_turns(turns)
-        self._let_go()
+        self.queue_turns((*self.schedule.between.get(p, ()), (self.order[p], None), *self.schedule.behind[p]))
+        self._let_go(p)
         self._left()
 
     def caught(self, error: BaseException, found: dict[str, Any]) -> None:
@@ -120,7 +117,7 @@ class Exits(Turns):
 
     def materialise(self, k: int, found: dict[str, Any]) -> RunningNode:
         """Members before k have fired and k is amid its firing: let the interpreted way see it so."""
-        self._go_by_rules(k, found, self.schedule.behind[k], amid=True)
+        self._go_by_rules(k, found, amid=True)
         worker, stamp = self.order[k], found["stamp"]
         if k in self.schedule.called:
             worker.begin_call(worker.slot_edges[0], stamp)
@@ -128,32 +125,30 @@ class Exits(Turns):
             worker.resume_as_firing(worker.live_inputs if k else self.held_entries, stamp)
         self.queue_turns(self.schedule.behind[k])
         if k:
-            self._let_go()
+            self._let_go(k)
         self.core.running_node = worker
         return worker
 
-    def _let_go(self) -> None:
-        """Nothing the head has sent is waited for, for who would was disabled: what it took is processed (F5, F10)."""
+    def _let_go(self, k: int) -> None:
+        """Nobody waits for a member that was disabled meanwhile (F10).
+
+        Those behind it may have all that they wait for, except for k and those who have their turns already. What the
+        head took is processed if nothing it has sent is waited for (F5).
+        """
+        if self.doomed:
+            for worker in self.order[k + 1 :]:
+                agenda.consider(worker)
         if not self.head.outputs.missing:
             agenda.consider(self.head)
             release(self.held_entries)
 
-    def _go_by_rules(self, k: int, found: dict[str, Any], turns: Sequence[Turn], *, amid: bool = False) -> None:
-        """Write down what lies where when members before k have fired.
-
-        Args:
-          k: the member.
-          found: the locals of the wave.
-          turns: whose turns may come now.
-          amid: k has taken what lay before it.
-        """
+    def _go_by_rules(self, k: int, found: dict[str, Any], *, amid: bool = False) -> None:
+        """Write down what lies where when members before k have fired; `amid`: k has taken what lay before it."""
         self.waves += found["done"]
         self.settle_counts()
         emit_rest(self._wave.untold.get(k, ()) if amid else (), found, self.core.now)
         self.armed = self.running = self.called_off = False
-        stamp = found["stamp"]
         silent_calls: set[SyncEdge] = set()
-        disabled = False
         for j in range(k):
             if j in self.schedule.called:  # its silence is counted already
                 self.order[j].counts.add_calls(1)
@@ -163,33 +158,24 @@ class Exits(Turns):
                 if to is None:
                     continue
                 edge.sent += 1
-                value = found.get(f"v{j}_{output}")
-                if to < k + amid:
-                    continue
-                if not edge.live:
-                    disabled = True
-                    self._discard(edge, to, value, lies=edge.active and bool(found.get(f"m{j}")))
-                elif not self._lay(edge, to, value, stamp):
+                value, carries = found.get(f"v{j}_{output}"), bool(found.get(f"m{j}"))
+                if to >= k + amid and not self._lay(edge, to, value, found["stamp"], carries=carries):
                     silent_calls.add(edge)
         self._write_barriers(k, silent_calls)
-        if disabled:  # by which a member behind the disabled one may have all that it waits for
-            for worker in self.order[k + amid :]:
-                if (worker, None) not in turns:
-                    agenda.consider(worker)
 
-    def _discard(self, edge: SyncEdge, to: int, value: object, *, lies: bool) -> None:
-        """One end of the edge was disabled behind the sending, which discards what was sent, and counts it (F10).
+    def _lay(self, edge: SyncEdge, to: int, value: object, stamp: float, *, carries: bool) -> bool:
+        """Put what a local holds on the edge to member `to`; a slot is not called by a marker (T4).
 
-        A marker into a slot was processed at once (T4); what `lies` there with activity was discarded by the rules.
+        If one end was disabled since, what was sent is discarded and counted (F10). What carries activity was a token
+        on the edge already, so that has been done by the rules.
         """
-        if not lies and (value is not None or to not in self.schedule.called):
-            edge.count_dropped()
-
-    def _lay(self, edge: SyncEdge, to: int, value: object, stamp: float) -> bool:
-        """Put what a local holds on the edge to member `to`; a slot is not called by a marker (T4)."""
         target, called = self.order[to], to in self.schedule.called
         if value is None and called:
             return False
+        if not edge.live:
+            if not (carries and edge.active):
+                edge.count_dropped()
+            return True
         if edge.token is None:  # else it carries activity, and lies there already
             edge.token = Token(NO_MESSAGE if value is None else value, 0, stamp, edge.sent)
         if called:
