@@ -29,7 +29,7 @@ from tests.support.making import Allowed, random_plan
 from tests.support.shrinking import shrink
 
 LEAST_SHARE = 0.25  # of all firings and calls are fused
-FOUND = (790002898, 790003574, 790000602, 800000506)  # by the soak
+FOUND = (790002898, 790003574, 790000602, 800000506, 830000987, 851000626, 851001881)  # by the soak
 MOST_MOVES = 1500
 MOST_MOVES_OF_LARGE = 5000
 BESIDE_THREADS = Allowed(plain=True, threads=True, lossy=False, gates=False)
@@ -165,7 +165,7 @@ def check(calls: Calls, seed: int, allowed: Allowed) -> None:
     pytest.fail(f"seed {seed}\n{small}\n\n{fusing_differs(calls, small, seed)}", pytrace=False)
 
 
-@pytest.mark.rule("F10", "X1")
+@pytest.mark.rule("F1", "F10", "T5", "X1")
 @pytest.mark.parametrize("seed", FOUND)
 def test_what_the_soak_has_found_is_one_in_all_runs(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     check(note_calls(monkeypatch), seed, plain_shapes(seed))

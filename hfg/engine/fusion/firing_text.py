@@ -152,6 +152,10 @@ class FiringText(Facts):
             say(f"if not ({' or '.join(odd)}):")
             self.indent += 1
         say(f"spread[{k}] += 1")
+        for t in range(k, len(self.order)):
+            for number, (edge, _, to) in enumerate(self.outs[t]):
+                if to is None and edge.target_kind == "slot":  # silence passes it without a trace but its number (T4)
+                    say(f"e{t}_{number}.sent += 1")
         told = self.taps.branch()
         if self.loops:
             self._end_of_wave()

@@ -7,6 +7,7 @@ at each firing. Only a shortening, as in `slots`: what it does not cover goes th
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 from typing import Any
 
 from hfg.engine.model.core import PENDING
@@ -47,7 +48,7 @@ def waiting_step(worker: RunningNode) -> Step:
         if worker.special or not worker.fireable or inputs.missing or worker.busy:
             firing.step(worker)
             return
-        stamp = -1.0
+        stamp = -inf  # a node may set any stamp (T5)
         arguments = list(unset)
         for edge in edges:
             token: Any = edge.token

@@ -60,13 +60,8 @@ class WaveState:
         self.waves = 0  # not yet in the counts of members and edges
         self.silent = [0] * len(order)  # silent firings, likewise
         self.spread = [0] * len(order)  # how often all behind a member were silent since it was
-        self._unheard = [self._into_slots(k) for k in range(len(order))]
         self._exits = [0] * len(order)
         self._formed_at = head.counts.firings
-
-    def _into_slots(self, k: int) -> list[Any]:
-        """Edges of member k over the border into slots: silence passes them without a trace but its number (T4)."""
-        return [edge for edge, _, to in self.schedule.outs[k] if to is None and edge.target_kind == "slot"]
 
     # --- armed or not -----------------------------------------------------------------------------------------------
 
@@ -178,6 +173,8 @@ class WaveState:
                     edge.unprocessed = edge.live and (to >= k or not done[to]) and edge not in silent_calls
                 missing += edge.unprocessed
             worker.wait_for_taking(missing, worker.live_inputs if j else self.held_entries)
+            if missing:
+                worker.drop_firing()  # of the head, to which a place was given while its outputs were not counted (F1)
             done[j] = not missing
 
     # --- counts -----------------------------------------------------------------------------------------------------
@@ -193,8 +190,6 @@ class WaveState:
             silent = self.silent[number] + spread
             spread += self.spread[number]
             self.silent[number] = self.spread[number] = 0
-            for edge in self._unheard[number] if spread else ():
-                edge.sent += spread
             if number in called:  # by a marker a slot is not called (T4)
                 worker.counts.add_calls(waves - silent)
             else:
