@@ -85,10 +85,20 @@ def note_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
     calls = Calls()
     process_call, handler = hfg.Node._process_call, hfg.Node._handler
 
-    async def to_its_end(node: Any, what: str, call: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-        result = await call(*arguments)
-        calls.note(node, f"{what} ends", result)
-        return result
+    def noted(node: Any, what: str, call: Callable[..., Any], *, is_async: bool) -> Callable[..., Any]:
+        """As async as the code itself, because the engine asks."""
+
+        async def to_its_end(*arguments: Any) -> Any:
+            calls.note(node, what, arguments)
+            result = await call(*arguments)
+            calls.note(node, f"{what} ends", result)
+            return result
+
+        def called(*arguments: Any) -> Any:
+            calls.note(node, what, arguments)
+            return call(*arguments)
+
+        return to_its_end if is_async else called
 
     def noted_process(self: Any) -> Callable[..., Any]:
         call = process_call(self)
@@ -106,26 +116,11 @@ def note_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
 
             return draw
 
-        def process(*arguments: Any) -> Any:
-            calls.note(self, "process", arguments)
-            if self._type.process_kind == "async":
-                return to_its_end(self, "process", call, arguments)
-            return call(*arguments)
-
-        return process
+        return noted(self, "process", call, is_async=self._type.process_kind == "async")
 
     def noted_handler(self: Any, name: str) -> Callable[..., Any] | None:
         call = handler(self, name)
-        if call is None:
-            return None
-
-        def handle(*arguments: Any) -> Any:
-            calls.note(self, name, arguments)
-            if inspect.iscoroutinefunction(call):
-                return to_its_end(self, name, call, arguments)
-            return call(*arguments)
-
-        return handle
+        return call and noted(self, name, call, is_async=inspect.iscoroutinefunction(call))
 
     monkeypatch.setattr(hfg.Node, "_process_call", noted_process)
     monkeypatch.setattr(hfg.Node, "_handler", noted_handler)
