@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
 from tests.studio.stories.bench import Story
 
-axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 pytestmark = pytest.mark.slow
 
 
@@ -44,7 +44,7 @@ def test_axe_finds_nothing_serious(story: Story, act: Callable[[Story], None], t
     story.page.reload()
     story.node("numbers").wait_for()
     act(story)
-    found = axe.Axe().run(story.page).response["violations"]
+    found = Axe().run(story.page).response["violations"]
     serious = [f"{one['id']}: {one['nodes'][0]['target']}" for one in found if one["impact"] in ("serious", "critical")]
     assert serious == []
 
