@@ -41,6 +41,7 @@ FOUND = (  # by the soak
     851001881,
     800005253,
     861003293,
+    870000569,
 )
 ORDERS = 50  # of permitted moves, where several would do
 MOST_MOVES = 1500
@@ -548,3 +549,32 @@ def test_a_join_behind_a_member_that_a_call_disables_amid_a_wave_goes_on_without
     report = hfg.run(graph, clock="virtual", fast=fast)
     assert report.outcome == "done"
     assert report.nodes["last"].processed == 6
+
+
+class TellsTwice(hfg.Node):
+    """Tells each value twice, and passes it on."""
+
+    value = hfg.Input(int)
+    told = hfg.Event(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> int:
+        self.told.trigger(value)
+        self.told.trigger(value)
+        return value
+
+
+@pytest.mark.rule("F8")
+@pytest.mark.parametrize("fast", [False, True])
+def test_a_full_queue_before_a_region_that_waits_for_its_sender_grows(fast: bool) -> None:
+    graph = hfg.Graph()
+    tells, pair = graph.add(TellsTwice()), graph.add(nodes.add())
+    last = graph.add(nodes.with_default(), name="last")
+    first = graph.add(nodes.with_default(), name="first")
+    graph.connect(graph.add(nodes.Script(count=6)).out, tells.value)
+    graph.connect(tells.told, first.value, capacity=2)
+    graph.connect(first.out, last.value)
+    graph.connect(last.out, pair.a)
+    graph.connect(tells.out, pair.b)
+    report = hfg.run(graph, clock="virtual", fast=fast)
+    assert (report.outcome, report.nodes["add"].processed) == ("done", 6)

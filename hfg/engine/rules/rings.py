@@ -319,6 +319,8 @@ class _Walk:
         if what == _ROOM:
             full = _full_edges(worker)
             return _Wait([_taking(edge) for edge in full]) if full else worker
+        if worker.region is not None:
+            worker.region.disarm()  # while it is armed its head alone says that something is not processed
         if worker.node is None and worker.scope is None and not (worker is self._core.boundary and what == _CALL):
             return self._at_border(worker)
         if what == _FIRE:
