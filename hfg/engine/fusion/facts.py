@@ -89,6 +89,21 @@ class Facts:
         """Whether it may leave to another member: then the local `m` says whether it has."""
         return self.turns and any(edge.active and to is not None for edge, _, to in self.outs[k])
 
+    def _hands_over(self, k: int) -> bool:
+        """Whether its activity can only go to the next member, and nothing but A(v) of the two follows (A5, A6).
+
+        Nobody has a turn between the two, so whether the token was ever on the edge makes no difference.
+        """
+        ways = [(edge, to) for edge, _, to in self.outs[k] if edge.active]
+        if not self.turns or self.is_async or len(ways) != 1 or ways[0][1] != k + 1 or ways[0][0].tap is not None:
+            return False
+        if k + 1 in self.called or k + 1 in self.schedule.between or self.fires_with_slots(k + 1):
+            return False
+        giver, taker = self.order[k], self.order[k + 1]
+        if giver.shape.announced or self._sends_itself(giver):
+            return False
+        return not (giver.watched or taker.watched or taker.listened is not None)
+
     def _givers(self, k: int) -> list[int]:
         """The members whose activity may come to member k."""
         if not self.turns:
@@ -139,10 +154,17 @@ class Facts:
             return ""
         if worker.shape.announced:
             return "True"
-        odd = []
+        odd, gives = [], self._gives_away(k)
         if self._sends_itself(worker):
-            odd += [f"w{k}.may_carry", f"w{k}.events_due"]
+            odd += [f"w{k}.may_carry", f"w{k}.events_due"] if gives else []
         elif self._may_take(k):
             odd.append(f"w{k}.busy")
+        if gives:
+            met = ["core.trace_changes is not None", *([f"c{k}"] if self.fires_with_slots(k) else [])]
+            odd.append(f"{gives} and ({' or '.join(met)})" if self._hands_over(k) else gives)
+        return " or ".join(odd)
+
+    def _gives_away(self, k: int) -> str:
+        """When activity leaves member k with what it sends (A5)."""
         gives = " or ".join(f"{value} is not None" for value in self._gives(k))
-        return " or ".join([*odd, f"w{k}.active and ({gives})"] if gives else odd)
+        return f"w{k}.active and ({gives})" if gives else ""

@@ -300,11 +300,19 @@ class FiringText(Facts):
             self.taps.emit()
             say(f"m{k} = False" if gives_inside else "pass")
             self._enable(k)
+            if self._hands_over(k):
+                say(f"if {self._gives_away(k)}:")
+                say(f"    w{k}.active = w{k}.node._active = False")
+                say(f"    w{k + 1}.active = w{k + 1}.node._active = True")
             self.indent -= 1
         if writes:
             self._finish(k)
 
     def _finish(self, k: int) -> None:
+        """Its firing is over: what it was to tell behind that follows, and the right of A3 ends."""
+        if self.turns and not self._odd_sending(k):
+            self.say(f"if w{k}.events_due: region.finish({k})")
+            self.say(f"w{k}.may_carry = False")
         self.say(f"w{k}.busy = {self._amid()}; w{k}.stamp = None")
 
     def _put(self, k: int, *, silent: bool = False) -> None:
