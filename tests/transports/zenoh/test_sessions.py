@@ -7,12 +7,14 @@ import itertools
 import sys
 import threading
 import time
+from collections.abc import Callable, Coroutine
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from hfg.errors import MessageTooLarge, TransportError
+from hfg.errors import MessageTooLarge, NoAnswer, TransportError
 from hfg.transport import Message, Presence, Session, Traffic, Transport
 from hfg_transports.zenoh import ZenohSession, ZenohTransport, names, versions
 from hfg_transports.zenoh.config import LONG
@@ -30,6 +32,18 @@ def connected(session: ZenohSession, others: set[str]) -> bool:
     return {one.peer for one in session.connections()} == others
 
 
+def present(session: ZenohSession) -> set[str]:
+    """Return who is there according to a session, from now on."""
+    there: set[str] = set()
+
+    def changed(presences: list[Presence]) -> None:
+        for one in presences:
+            (there.add if one.present else there.discard)(one.name)
+
+    session.watch("", changed)
+    return there
+
+
 async def test_it_is_a_transport(two: Two) -> None:
     assert isinstance(ZenohTransport(), Transport)
     assert isinstance(two[0], Session)
@@ -39,14 +53,46 @@ async def test_programs_meet_in_any_order_and_go_on_meeting_when_the_first_has_g
     open_one: Open, here: dict[str, Any]
 ) -> None:
     """The first has the address at which they meet; when it goes, the next who comes has it, and the others find it."""
-    first, second, third = await open_one(**here), await open_one(**here), await open_one(**here)
-    everybody = {first.name, second.name, third.name}
-    for one in (first, second, third):
-        await until(partial(connected, one, everybody - {one.name}))
+
+    async def join(name: str) -> tuple[ZenohSession, Callable[[set[str]], Coroutine[Any, Any, None]]]:
+        session = await open_one(**here)
+        session.announce(name)
+        there = present(session)
+        return session, lambda names: until(lambda: there == names)
+
+    first, first_sees = await join("first")
+    _, second_sees = await join("second")
+    _, third_sees = await join("third")
+    for sees in (first_sees, second_sees, third_sees):
+        await sees({"first", "second", "third"})
     await first.close()
-    await until(partial(connected, second, {third.name}))
-    fourth = await open_one(**here)
-    await until(partial(connected, fourth, {second.name, third.name}))
+    await second_sees({"second", "third"})
+    _, fourth_sees = await join("fourth")
+    for sees in (second_sees, third_sees, fourth_sees):
+        await sees({"second", "third", "fourth"})
+
+
+async def test_a_session_that_closes_withdraws_what_it_has_declared_before_zenoh_closes(
+    two: Two, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Zenoh may connect again while it closes, and would declare there what the session still has."""
+
+    async def answer(question: bytes) -> bytes:
+        return question
+
+    first, second = two
+    there = present(second)
+    first.announce("first")
+    first.answer("name", answer)
+    await until(lambda: there == {"first"})
+    assert await soon(second.ask("name", b"1")) == b"1"
+    raw = first._raw
+    monkeypatch.setattr(first, "_raw", SimpleNamespace(close=lambda: None))
+    await first.close()
+    await until(lambda: not there)
+    with pytest.raises(NoAnswer, match="nobody answers"):
+        await second.ask("name", b"2")
+    raw.close()
 
 
 async def test_programs_that_were_first_find_the_agent_that_comes_later(open_one: Open, here: dict[str, Any]) -> None:

@@ -11,6 +11,7 @@
     sending     puts; long ones from a thread of their own
     presence    announcements and watches over liveliness tokens
     asking      questions and answers
+    declaring   what a session has declared, and withdraws before it closes
     versions    who else is in the realm, and whether it speaks the same
     ending      closes what a program that ends has left open
     transport   the contract of `hfg.transport`, composed of these

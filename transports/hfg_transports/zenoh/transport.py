@@ -21,6 +21,7 @@ from hfg.errors import MessageTooLarge, NoAnswer, TransportError
 from hfg.transport import Answer, Message, Receive, Traffic, Watch
 from hfg_transports.zenoh import binding
 from hfg_transports.zenoh.asking import Answerer, Question
+from hfg_transports.zenoh.declaring import Declarations, Declared
 from hfg_transports.zenoh.ending import close_at_the_end
 from hfg_transports.zenoh.inbox import Inbox, Mailbox
 from hfg_transports.zenoh.names import Keys, escape, join
@@ -168,7 +169,8 @@ class ZenohSession:
         self._mailboxes: list[Mailbox[Any]] = []
         self._answerers: set[Answerer] = set()
         self._questions: set[Question] = set()
-        self._announced: dict[str, zenoh.LivelinessToken] = {}  # kept, for a token that nobody holds is withdrawn
+        self._announced: set[str] = set()
+        self._declarations = Declarations()
         self._announcements = 0
         self._lost = 0  # of mailboxes that are closed
         self._refused = 0
@@ -176,12 +178,10 @@ class ZenohSession:
         self._replies: Mailbox[tuple[Question, Any]] = Mailbox(self._inbox, "answers", _settle)
         versions: Mailbox[str] = Mailbox(self._inbox, "the watch over versions", self._version_told)
         self._warned: set[str] = set()
-        raw.liveliness().declare_subscriber(
-            f"{self._keys.versions}/**",
-            binding.callback(lambda sample: versions.leave(str(sample.key_expr))),
-            history=True,
-        )
-        self._version = raw.liveliness().declare_token(version_key(self._keys, self.name))
+        told = binding.callback(lambda sample: versions.leave(str(sample.key_expr)))
+        keep = self._declarations.keep
+        keep(raw.liveliness().declare_subscriber(f"{self._keys.versions}/**", told, history=True))
+        keep(raw.liveliness().declare_token(version_key(self._keys, self.name)))
         close_at_the_end(self)
 
     # --- what it says of itself ---
@@ -241,7 +241,7 @@ class ZenohSession:
             else:
                 leave((header, sample.payload.to_bytes()), size)
 
-        return self._until_closed(mailbox, self._raw.declare_subscriber(full, binding.callback(arrived)).undeclare)
+        return self._until_closed(mailbox, self._raw.declare_subscriber(full, binding.callback(arrived)))
 
     # --- presence ---
 
@@ -252,12 +252,12 @@ class ZenohSession:
             raise TransportError(f'"{name}" is announced by this session already; take another name')
         self._announcements += 1
         key = presence_key(self._keys.presences, self.name, self._announcements, name, metadata)
-        token = self._raw.liveliness().declare_token(key)
-        self._announced[name] = token
+        token = self._declarations.keep(self._raw.liveliness().declare_token(key))
+        self._announced.add(name)
 
         def withdraw() -> None:
-            self._announced.pop(name, None)
-            self._undeclare(token.undeclare)
+            self._announced.discard(name)
+            self._declarations.withdraw(token)
 
         return Announcement(withdraw)
 
@@ -274,7 +274,7 @@ class ZenohSession:
         subscriber = self._raw.liveliness().declare_subscriber(
             prefix_key(self._keys.presences, prefix), binding.callback(told), history=True
         )
-        return self._until_closed(mailbox, subscriber.undeclare)
+        return self._until_closed(mailbox, subscriber)
 
     # --- questions ---
 
@@ -285,13 +285,14 @@ class ZenohSession:
         mailbox: Mailbox[zenoh.Query] = Mailbox(self._inbox, f'who answers to "{name}"', answerer.asked)
         queryable = self._raw.declare_queryable(full, binding.callback(mailbox.leave), complete=True)
         self._answerers.add(answerer)
+        answering = self._until_closed(mailbox, queryable)
 
         def close() -> None:
             self._answerers.discard(answerer)
             answerer.close()
-            queryable.undeclare()
+            answering.close()
 
-        return self._until_closed(mailbox, close)
+        return Announcement(close)
 
     async def ask(self, name: str, question: bytes = b"", *, timeout_s: float = 5.0) -> bytes:
         """Ask who answers to a name; see `hfg.transport.Session.ask`."""
@@ -345,6 +346,7 @@ class ZenohSession:
         Zenoh raises if a receiver has not responded for ten seconds; this is not an error of the sender.
         """
         self._sender.close(CLOSE_S / 2)
+        self._declarations.withdraw_all()
         with contextlib.suppress(Exception):
             self._raw.close()
 
@@ -367,24 +369,18 @@ class ZenohSession:
         self._check_open()
         return join(prefix, escape(name))
 
-    def _until_closed(self, mailbox: Mailbox[Any], undeclare: Callable[[], object]) -> Announcement:
+    def _until_closed(self, mailbox: Mailbox[Any], declared: Declared) -> Announcement:
         """Keep what was declared until it is closed."""
         self._mailboxes.append(mailbox)
+        self._declarations.keep(declared)
 
         def close() -> None:
             mailbox.close()
             self._lost += mailbox.lost
             self._mailboxes.remove(mailbox)
-            self._undeclare(undeclare)
+            self._declarations.withdraw(declared)
 
         return Announcement(close)
-
-    def _undeclare(self, undeclare: Callable[[], object]) -> None:
-        if self._closing is None:
-            try:
-                undeclare()
-            except Exception as error:
-                log().debug("Zenoh could not withdraw something: %s", error)
 
     def _version_told(self, told: list[str]) -> None:
         for key in told:
