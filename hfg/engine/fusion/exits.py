@@ -49,7 +49,6 @@ class Exits(Turns):
 
     def mute(self, k: int, found: dict[str, Any]) -> None:
         """Member k is silent, and enables one at which calls wait, while others have their turns before (F9)."""
-        self.silent[k] -= 1  # which counts where the firing ends
         worker = self.materialise(k, found)
         worker.counts.add_silent()
         put_outputs(worker, None)

@@ -122,13 +122,14 @@ class FiringText(Facts):
     def _be_silent(self, k: int) -> bool:
         """A silent firing; whether the wave is over by it, for all behind are silent as well."""
         say, worker = self.say, self.order[k]
-        say(" = ".join([*(f"v{k}_{output}" for output in range(max(1, len(worker.out_names)))), "None"]))
-        say(f"silent[{k}] += 1")
         self._meet(k, "mute")
         if self._silences_all_behind(k) and not self.fires_with_slots(k):
-            self._over_by_silence(k, [f"w{k}.busy"] if self._may_take(k) else [])
+            count = f"spread[{k - 1}] += 1" if k else "silent[0] += 1; spread[0] += 1"
+            self._over_by_silence(k, count, [f"w{k}.busy"] if self._may_take(k) else [])
             if self._is_over_by_silence(k):
                 return True
+        say(" = ".join([*(f"v{k}_{output}" for output in range(max(1, len(worker.out_names)))), "None"]))
+        say(f"silent[{k}] += 1")
         if self._gives_inside(k):
             say(f"m{k} = False")
         self._put(k, silent=True)
@@ -139,11 +140,12 @@ class FiringText(Facts):
             say(f"if w{k}.busy: region.finish({k})")
         return False
 
-    def _over_by_silence(self, k: int, odd: list[str]) -> None:
+    def _over_by_silence(self, k: int, count: str, odd: list[str]) -> None:
         """All behind member k are silent, so the wave is over; not while calls wait there, for those have places.
 
         Args:
           k: the member.
+          count: the line that counts it.
           odd: what else keeps the wave from being over.
         """
         say = self.say
@@ -151,7 +153,7 @@ class FiringText(Facts):
         if odd:
             say(f"if not ({' or '.join(odd)}):")
             self.indent += 1
-        say(f"spread[{k}] += 1")
+        say(count)
         for t in range(k, len(self.order)):
             for number, (edge, _, to) in enumerate(self.outs[t]):
                 if to is None and edge.target_kind == "slot":  # silence passes it without a trace but its number (T4)
@@ -239,7 +241,7 @@ class FiringText(Facts):
         if self._sends_itself(worker):
             self.say(f"if not ({' or '.join(odd)}):")
             self.say(f"    w{k}.busy = ''; w{k}.stamp = None")
-        self._over_by_silence(k, odd)
+        self._over_by_silence(k, f"spread[{k}] += 1", odd)
         if self._is_over_by_silence(k) and not odd:
             self.over_if_silent.add(k)
         self.indent -= 1
