@@ -1,7 +1,7 @@
 """Limits the connections that hold no page, because each takes a file handle of the run (L5).
 
-A program of any user can connect before it is asked for the token. A browser sends its request at once, so the oldest
-connection gives way to a new one. Depends on uvicorn.
+A program can connect before it is asked for the token; where the system cannot tell its user, any program. A browser
+sends its request at once, so the oldest connection gives way to a new one. Depends on uvicorn.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ Depends on uvicorn, `crowding` and `web`.
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 import socket
 import threading
@@ -15,10 +16,11 @@ from typing import Any, Final
 
 import uvicorn
 
+from hfg.base.loopback import OwnListener
 from hfg.errors import TargetError
 from hfg.studio.cookies import forget_secret, secret_of_port
 from hfg.studio.crowding import bounded_http
-from hfg.studio.entrance import Entrance, need_guarded
+from hfg.studio.entrance import Entrance, is_loopback, need_guarded
 from hfg.studio.messages import LONGEST, FromPage, read
 from hfg.studio.studio import Studio
 from hfg.studio.viewing import Viewer
@@ -30,6 +32,8 @@ STATIC: Final = Path(__file__).with_name("static")
 """The built page; HFG_STUDIO_STATIC names another folder, for those who work on the page."""
 
 _PORTS: Final = range(8800, 8900)
+_LOCALHOST: Final = ("127.0.0.1", "::1")
+_NO_SUCH_ADDRESS: Final = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
 
 
 class _Visit:
@@ -94,8 +98,8 @@ class Server:
         """
         encrypted = certfile is not None
         need_guarded(host, encrypted=encrypted, insecure=insecure)
-        self._socket = _listening(host, port)
-        self._port = port = int(self._socket.getsockname()[1])
+        self._sockets = _listening(host, port)
+        self._port = port = int(self._sockets[0].getsockname()[1])
         shown = socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
         names = () if shown == host else (shown,)
         self.entrance = Entrance(
@@ -107,7 +111,7 @@ class Server:
         self._thread = threading.Thread(target=self._live, name="hfg studio server", daemon=True)
 
     def _live(self) -> None:
-        asyncio.run(self._server.serve(sockets=[self._socket]))
+        asyncio.run(self._server.serve(sockets=self._sockets))
 
     def start(self) -> None:
         """Begin."""
@@ -117,7 +121,8 @@ class Server:
         """End, and wait until the server has ended."""
         self._server.should_exit = True
         await asyncio.to_thread(self._thread.join, 3.0)
-        self._socket.close()
+        for one in self._sockets:
+            one.close()
         forget_secret(self._port)
 
 
@@ -140,21 +145,52 @@ def _config(app: Any, certfile: str | None, keyfile: str | None) -> uvicorn.Conf
     )
 
 
-def _listening(host: str, port: int | None) -> socket.socket:
-    """Take the given port, or else the first free one."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+def _listening(host: str, port: int | None) -> list[socket.socket]:
+    """Take the given port, or else the first free one; of "localhost", both addresses.
+
+    Browsers and tunnels to "localhost" try both. Another user who has one of the two would learn the token.
+    """
+    first = "127.0.0.1" if host == "localhost" else host
+    others = [one for one in _LOCALHOST if one != first] if first in _LOCALHOST else []
     last: OSError | None = None
-    for one in _PORTS if port is None else (port,):
-        listening = socket.socket(family, socket.SOCK_STREAM)
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    for one in (*_PORTS, 0) if port is None else (port,):
+        sockets = []
         try:
-            listening.bind((host, one))
-            listening.listen()  # now: two sockets that only have the same address would both be content
+            sockets.append(_bound(first, one))
+            for other in others:
+                try:
+                    sockets.append(_bound(other, sockets[0].getsockname()[1]))
+                except OSError as error:
+                    if error.errno not in _NO_SUCH_ADDRESS:
+                        raise
         except OSError as error:
-            listening.close()
+            for taken in sockets:
+                taken.close()
             last = error
         else:
-            return listening
+            return sockets
     assert last is not None
-    where = f"port {port}" if port is not None else f"every port from {_PORTS.start} to {_PORTS.stop - 1}"
-    raise TargetError(f"{where} of {host} cannot be taken: {last.strerror}; name another one by --port")
+    where = "any port" if port is None else f"port {port}"
+    raise TargetError(f"{where} of {last.filename} cannot be taken: {last.strerror}; name another one by --port")
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    """Return a socket that listens; on loopback, only to programs of this user.
+
+    Raises:
+      OSError: it cannot; the file name is the host.
+    """
+    kind = OwnListener if is_loopback(host) else socket.socket
+    try:
+        listening = kind(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
+        try:
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listening.bind((host, port))
+            listening.listen()  # now: two sockets that only have the same address would both be content
+        except BaseException:
+            listening.close()
+            raise
+    except OSError as error:
+        error.filename = host
+        raise
+    return listening

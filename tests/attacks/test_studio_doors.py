@@ -1,0 +1,176 @@
+"""Another user of the same computer cannot enter a studio, whatever he knows, nor stand in for one (rule L5)."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+
+from hfg.base.loopback import OwnListener
+from hfg.errors import TargetError
+from hfg.studio.serving import Server, StudioDoor
+from tests.studio.page import live, studio_of
+from tests.studio.test_studio import doubling
+
+pytest.importorskip("tests.attacks.another_user", exc_type=ImportError)
+from tests.attacks.another_user import as_nobody
+
+pytestmark = pytest.mark.rule("L5")
+
+only_root = pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can begin a process of another user"
+)
+LOCALHOST = ((socket.AF_INET, "127.0.0.1"), (socket.AF_INET6, "::1"))
+
+
+def has_address(family: socket.AddressFamily, host: str) -> bool:
+    try:
+        with socket.socket(family) as one:
+            one.bind((host, 0))
+    except OSError:
+        return False
+    return True
+
+
+HERE = [one for one in LOCALHOST if has_address(*one)]
+only_both = pytest.mark.skipif(len(HERE) < 2, reason="this computer has one address of localhost only")
+
+
+@pytest.fixture(autouse=True)
+def place(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Keep the secrets of tests out of the user's folder."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
+def asks(family: socket.AddressFamily, host: str, port: int, token: str) -> str:
+    """Ask for the page with the right token; returns the first line of the answer, "" if there is none."""
+    with socket.socket(family) as one:
+        one.settimeout(10)
+        try:
+            one.connect((host, port))
+            one.sendall(
+                f"GET / HTTP/1.1\r\nHost: localhost:{port}\r\nAuthorization: Bearer {token}\r\n"
+                "Connection: close\r\n\r\n".encode()
+            )
+            return one.recv(1000).partition(b"\r\n")[0].decode()
+        except ConnectionError:
+            return ""
+
+
+@only_root
+@pytest.mark.slow
+@pytest.mark.parametrize(("family", "host"), HERE)
+def test_a_program_of_another_user_gets_no_answer_even_with_the_token(family: socket.AddressFamily, host: str) -> None:
+    async def main() -> None:
+        server = Server(StudioDoor(asyncio.get_running_loop(), studio_of(doubling())))
+        server.start()
+        port, token = urlsplit(server.address).port, server.entrance.token
+        assert port is not None
+        theirs = await asyncio.to_thread(as_nobody, lambda: [asks(family, host, port, token) for _ in range(20)])
+        mine = await asyncio.to_thread(asks, family, host, port, token)
+        await server.stop()
+        assert theirs == [""] * 20
+        assert mine == "HTTP/1.1 200 OK"
+
+    live(main)
+
+
+@pytest.fixture
+def listener() -> Iterator[OwnListener]:
+    with OwnListener(socket.AF_INET) as one:
+        one.bind(("127.0.0.1", 0))
+        one.listen()
+        yield one
+
+
+@only_root
+def test_the_user_of_a_connection_is_asked_for_before_anything_is_read(
+    listener: OwnListener, caplog: pytest.LogCaptureFixture
+) -> None:
+    refusals: list[str] = []
+
+    def accept_all() -> None:
+        for _ in range(3):
+            try:
+                listener.accept()
+            except ConnectionAbortedError as error:
+                refusals.append(str(error))
+
+    def knocks() -> str:
+        with socket.socket() as one:
+            one.settimeout(10)
+            one.connect(listener.getsockname())
+            return one.recv(1).decode()
+
+    accepting = threading.Thread(target=accept_all)
+    accepting.start()
+    assert [as_nobody(knocks) for _ in range(3)] == [""] * 3
+    accepting.join(10)
+    assert len(refusals) == listener.refused == 3
+    assert len([one for one in caplog.records if "another user was turned away" in one.message]) == 1
+
+
+def test_whoever_has_gone_again_is_nobody_so_that_no_request_comes_in_behind_the_check(listener: OwnListener) -> None:
+    """A connection that was closed belongs to no user; its request would still be read."""
+    with socket.socket() as one:
+        one.connect(listener.getsockname())
+        one.sendall(b"GET / HTTP/1.1\r\n\r\n")
+    with pytest.raises(ConnectionAbortedError):
+        listener.accept()
+
+
+def test_programs_of_this_user_are_let_in(listener: OwnListener) -> None:
+    with socket.socket() as one:
+        one.connect(listener.getsockname())
+        connected, address = listener.accept()
+        connected.close()
+        assert address == one.getsockname()
+
+
+@only_both
+@pytest.mark.parametrize("host", ["localhost", "127.0.0.1", "::1"])
+@pytest.mark.parametrize(("family", "taken"), HERE)
+def test_nobody_else_can_have_the_other_address_of_localhost(
+    host: str, family: socket.AddressFamily, taken: str
+) -> None:
+    """A browser that is told "localhost" tries ::1 first, and would tell the token to whoever listens there."""
+
+    async def main() -> None:
+        door = StudioDoor(asyncio.get_running_loop(), studio_of(doubling()))
+        with socket.socket(family) as other:
+            other.bind((taken, 0))
+            other.listen()
+            port = other.getsockname()[1]
+            with pytest.raises(TargetError, match=f"port {port} of {taken} cannot be taken"):
+                Server(door, host=host, port=port)
+        server = Server(door, host=host)
+        server.start()
+        port = urlsplit(server.address).port
+        for kind, address in HERE:
+            assert port is not None
+            with socket.socket(kind) as other:
+                other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                with pytest.raises(OSError, match="in use"):
+                    other.bind((address, port))
+        await server.stop()
+
+    live(main)
+
+
+def test_a_studio_finds_a_port_although_all_usual_ones_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def main() -> None:
+        with socket.create_server(("127.0.0.1", 0)) as other:
+            port = other.getsockname()[1]
+            monkeypatch.setattr("hfg.studio.serving._PORTS", range(port, port + 1))
+            server = Server(StudioDoor(asyncio.get_running_loop(), studio_of(doubling())))
+            server.start()
+            assert urlsplit(server.address).port not in (port, 0)
+            await server.stop()
+
+    live(main)
