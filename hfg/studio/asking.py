@@ -11,8 +11,10 @@ import msgspec
 
 from hfg.graph.structure.level import inside, level_of
 from hfg.graph.structure.paths import node_at, parameter_at
+from hfg.studio.choosing import edge_options, gates, operators, promotions, stops
 from hfg.studio.clipboard import pasted, text_of_nodes
 from hfg.studio.following import Following
+from hfg.studio.leading_out import ways_out
 from hfg.studio.palette import search_types, type_of_reference
 from hfg.studio.places import place_at
 from hfg.studio.refusing import Refused
@@ -156,6 +158,30 @@ async def _free_name(host: Following, args: _Name) -> Any:
     return {"name": level.members.free_name(name)[0]}
 
 
+async def _gates(host: Following, args: _Path) -> Any:
+    return gates(host.graph, args.path)
+
+
+async def _promotions(host: Following, args: _Path) -> Any:
+    return promotions(host.graph, args.path)
+
+
+async def _edge(host: Following, args: _Path) -> Any:
+    return edge_options(host.graph, args.path, runs=host.steering.run is not None)
+
+
+async def _operators(host: Following, args: _Nothing) -> Any:
+    return operators(host.graph)
+
+
+async def _stops(host: Following, args: _Path) -> Any:
+    return stops(host.graph, args.path)
+
+
+async def _ways_out(host: Following, args: _Path) -> Any:
+    return ways_out(host.graph, args.path)
+
+
 _ANSWERS: Final[Mapping[str, tuple[type[_Args], Callable[[Following, Any], Awaitable[Any]]]]] = {
     "targets": (_Targets, _targets),
     "search": (_Search, _search),
@@ -169,4 +195,10 @@ _ANSWERS: Final[Mapping[str, tuple[type[_Args], Callable[[Following, Any], Await
     "text": (_Paths, _text),
     "paste": (_Paste, _paste),
     "free_name": (_Name, _free_name),
+    "gates": (_Path, _gates),
+    "promotions": (_Path, _promotions),
+    "edge": (_Path, _edge),
+    "operators": (_Nothing, _operators),
+    "stops": (_Path, _stops),
+    "ways_out": (_Path, _ways_out),
 }

@@ -6,12 +6,13 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from hfg.errors import shown
+from hfg.base.token import Token
+from hfg.errors import in_words, shown
 from hfg.studio.messages import Condition
 
-__all__ = ["condition_text", "holds", "part_of"]
+__all__ = ["COMPARISONS", "Looked", "condition_text", "holds", "part_of"]
 
-_COMPARISONS: Final[Mapping[str, Callable[[Any, Any], Any]]] = {
+COMPARISONS: Final[Mapping[str, Callable[[Any, Any], Any]]] = {
     "==": operator.eq,
     "!=": operator.ne,
     "<": operator.lt,
@@ -24,7 +25,31 @@ _COMPARISONS: Final[Mapping[str, Callable[[Any, Any], Any]]] = {
 
 def holds(condition: Condition, value: object) -> bool:
     """Say whether a condition holds of a value."""
-    return bool(_COMPARISONS[condition.op](part_of(value, condition.field), condition.value))
+    return bool(COMPARISONS[condition.op](part_of(value, condition.field), condition.value))
+
+
+class Looked:
+    """Looks at each token whether a condition holds; what cannot be compared does not hold.
+
+    Attributes:
+      why_not: why the last value could not be compared; "" if it could.
+    """
+
+    def __init__(self, condition: Condition, failed: Callable[[], None]) -> None:
+        self._condition = condition
+        self._failed = failed
+        self.why_not = ""
+
+    def __call__(self, token: Token[Any]) -> bool:
+        """Return whether it holds; say once if values cannot be compared."""
+        try:
+            found, why_not = holds(self._condition, token.value), ""
+        except Exception as error:  # of the values' own code, too
+            found, why_not = False, in_words(error)
+        if why_not != self.why_not:
+            self.why_not = why_not
+            self._failed()
+        return found
 
 
 def part_of(value: object, field: str) -> Any:

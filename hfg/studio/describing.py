@@ -100,7 +100,7 @@ def _node(level: Level, name: str, node: Node, used: _Used) -> NodeRecord:
     said = options.said()
     said.pop("group", None)
     said.pop("enabled", None)
-    unnamed = is_box(node) and is_unnamed(node)
+    unnamed = is_box(node) and is_unnamed(node) and kind.reference is None
     path = level.path_to(name)
     return NodeRecord(
         path=path,

@@ -167,12 +167,21 @@ class ProblemRecord(msgspec.Struct, frozen=True):
 
 
 class BreakpointRecord(msgspec.Struct, frozen=True):
-    """A breakpoint; `holds`: the run is paused there now."""
+    """A breakpoint.
+
+    Attributes:
+      holds: the run is paused there now.
+      condition: in words; "" without one.
+      when: the condition as `Break` takes it.
+      why_not: why the last value could not be compared.
+    """
 
     path: str
     hits: int
     holds: bool
     condition: str
+    when: dict[str, Any] | None = None
+    why_not: str = ""
 
 
 class RunRecord(msgspec.Struct, frozen=True):

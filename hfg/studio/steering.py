@@ -19,7 +19,8 @@ from hfg.engine.editing.breakpoints import Breakpoint
 from hfg.errors import HfgError, NotRunning
 from hfg.graph import Graph
 from hfg.graph.editing.commands import Command
-from hfg.studio.conditions import condition_text, holds
+from hfg.nodetypes.node import Node
+from hfg.studio.conditions import Looked, condition_text
 from hfg.studio.failing import error_record
 from hfg.studio.messages import Condition
 from hfg.studio.places import place_at
@@ -46,6 +47,30 @@ class Follower(Protocol):
         """Something has changed in it that has to do with no single token."""
 
 
+class _Stop:
+    """A breakpoint that outlives runs."""
+
+    def __init__(self, condition: Condition | None, changed: Callable[[], None]) -> None:
+        self.condition = condition
+        self.looked = None if condition is None else Looked(condition, changed)
+        self.breakpoint: Breakpoint | None = None
+
+    def set_in(self, run: Run, place: Any) -> None:
+        """Pause this run there."""
+        self.breakpoint = run.break_at(place, when=self.looked)
+
+    def record(self, path: str, *, holds: bool) -> BreakpointRecord:
+        """Describe it for pages."""
+        return BreakpointRecord(
+            path,
+            0 if self.breakpoint is None else self.breakpoint.hits,
+            holds,
+            condition_text(self.condition),
+            None if self.condition is None else msgspec.to_builtins(self.condition),
+            "" if self.looked is None else self.looked.why_not,
+        )
+
+
 class Steering:
     """One graph and its runs, one after the other.
 
@@ -61,7 +86,7 @@ class Steering:
         self._target = target
         self._own = True
         self._record = RunRecord()
-        self._breakpoints: dict[str, tuple[Condition | None, Breakpoint | None]] = {}
+        self._stops: dict[str, _Stop] = {}
         self._task: asyncio.Task[None] | None = None
         self._until_stopped: asyncio.Event | None = None
         self._listener: Any = None
@@ -117,9 +142,9 @@ class Steering:
         self._offset = run.now() - run.elapsed()
         self._follower.run_begins(run.active(), run.elapsed())
         self._listener = run.trace(self._event, changes_only=True)
-        for path, (condition, _) in list(self._breakpoints.items()):
+        for path, stop in self._stops.items():
             with suppress(HfgError):  # there is no such place any more
-                self._breakpoints[path] = condition, self._set_breakpoint(run, path, condition)
+                stop.set_in(run, place_at(self.graph, path))
         number = self._record.number if self._own else 1
         self._say(state="paused" if run.paused else "running", number=number)
 
@@ -131,7 +156,8 @@ class Steering:
             outcome = run.report().outcome
         elapsed = 0.0 if run is None else run.elapsed()
         self._follower.run_ends(elapsed)
-        self._breakpoints = {path: (condition, None) for path, (condition, _) in self._breakpoints.items()}
+        for stop in self._stops.values():
+            stop.breakpoint = None
         error = None if failure is None else error_record(failure)
         self._say(state="ended", outcome=outcome, elapsed_s=elapsed, why="", error=error)
         self._over.set()
@@ -242,33 +268,36 @@ class Steering:
     # --- breakpoints ---
 
     def break_at(self, path: str, condition: Condition | None) -> None:
-        """Pause whenever the run comes there, now and in the runs to come."""
-        self.unbreak(path)
-        if self.run is None:
-            place_at(self.graph, path)  # a path that leads nowhere is refused at once
-            self._breakpoints[path] = condition, None
-        else:
-            self._breakpoints[path] = condition, self._set_breakpoint(self.run, path, condition)
-        self._follower.run_changed()
+        """Pause whenever the run comes there, now and in the runs to come.
 
-    def _set_breakpoint(self, run: Run, path: str, condition: Condition | None) -> Breakpoint:
-        when = None if condition is None else lambda token: holds(condition, token.value)
-        return run.break_at(place_at(self.graph, path), when=when)
+        Raises:
+          HfgError: the run cannot pause there; a breakpoint that was there stays.
+        """
+        place = place_at(self.graph, path)
+        if condition is not None and isinstance(place, Node):
+            raise Refused("usage", f'"{path}" is a node, and a condition looks at what is sent: set it at a port', path)
+        stop = _Stop(condition, self._follower.run_changed)
+        if self.run is not None:
+            stop.set_in(self.run, place)
+        if not isinstance(place, Node):  # at a node there is one for all
+            self._forget(path)
+        self._stops[path] = stop
+        self._follower.run_changed()
 
     def unbreak(self, path: str) -> None:
         """Pause there no more."""
-        _, found = self._breakpoints.pop(path, (None, None))
-        if found is not None:
-            found.remove()
+        self._forget(path)
         self._follower.run_changed()
+
+    def _forget(self, path: str) -> None:
+        stop = self._stops.pop(path, None)
+        if stop is not None and stop.breakpoint is not None:
+            stop.breakpoint.remove()
 
     def breakpoints(self) -> dict[str, BreakpointRecord]:
         """Return all breakpoints, by path."""
         why = self._record.why if self._record.state == "paused" else ""
-        return {
-            path: BreakpointRecord(path, 0 if found is None else found.hits, why == path, condition_text(condition))
-            for path, (condition, found) in self._breakpoints.items()
-        }
+        return {path: stop.record(path, holds=why == path) for path, stop in self._stops.items()}
 
     # --- what is told ---
 

@@ -22,7 +22,7 @@ from hfg.ports import InnerSource, InnerTarget, Port
 from hfg.studio.refusing import parts_of
 from hfg.types import describe
 
-__all__ = ["Fit", "end_of", "fit_of", "targets"]
+__all__ = ["Fit", "end_of", "ends_of", "fit_of", "targets"]
 
 Fit: TypeAlias = Literal["expects", "takes", "refused"]
 _ANY: Final = (Any, object)
@@ -42,7 +42,7 @@ def targets(graph: Graph, port: str, moving: str = "") -> dict[str, Any]:
     fixed, begins, level = end_of(graph, port)
     moved = next((edge for edge in level.edges if edge.label == moving), None)
     found: dict[str, dict[str, str]] = {}
-    for other in _ends(level, sources=not begins):
+    for other in ends_of(level, sources=not begins):
         if _owner(other) is _owner(fixed) and other is fixed:
             continue
         source, target = (fixed, other) if begins else (other, fixed)
@@ -100,10 +100,10 @@ def _text(end: PortEnd) -> str:
     return describe(type_of(end)) if end.type is not None else ""
 
 
-def _ends(level: Level, *, sources: bool) -> Iterator[PortEnd]:
+def ends_of(level: Level, *, sources: bool) -> Iterator[PortEnd]:
     """Yield all ends of a level at which edges begin, or end; automatic ports only if an edge uses them."""
     for node in level.nodes.values():
-        yield from _ends_of(node, sources=sources)
+        yield from _ends_of_node(node, sources=sources)
     if level.owner is not None:
         ports = level.owner.ports
         for port in (*ports.inputs.values(), *ports.slots.values()) if sources else ():
@@ -117,7 +117,7 @@ def _ends(level: Level, *, sources: bool) -> Iterator[PortEnd]:
     yield from (end for end in seen if is_port(end) and _is_automatic(end))
 
 
-def _ends_of(node: Node, *, sources: bool) -> Iterator[Port]:
+def _ends_of_node(node: Node, *, sources: bool) -> Iterator[Port]:
     ports = node.ports
     if sources:
         yield from ports.outputs.values()

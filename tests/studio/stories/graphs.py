@@ -13,7 +13,21 @@ from annotated_types import Ge, Interval
 import hfg
 from hfg.images import Gray
 
-__all__ = ["Collect", "Drive", "Errand", "Stamp", "count", "fails_at", "halves", "look", "mission", "picture", "scaled"]
+__all__ = [
+    "Clock",
+    "Collect",
+    "Drive",
+    "Errand",
+    "Stamp",
+    "count",
+    "fails_at",
+    "halves",
+    "look",
+    "mission",
+    "picture",
+    "scaled",
+    "workshop",
+]
 
 
 @hfg.node
@@ -58,11 +72,13 @@ def fails_at(value: int, *, limit: Annotated[int, Ge(0)] = 1_000_000_000) -> int
 class Collect(hfg.Node):
     """Keep what was received last, and how much."""
 
+    first = hfg.State(-1)
     last = hfg.State(-1)
     seen = hfg.State(0)
 
     def process(self, value: int) -> None:
         """Keep it."""
+        self.first = value if self.seen == 0 else self.first
         self.last = value
         self.seen += 1
 
@@ -119,4 +135,60 @@ def mission() -> hfg.Graph:
     graph.start.activates(errand.begin)
     errand.done.activates(rest.begin)
     rest.done.activates(errand.begin)
+    return graph
+
+
+class Clock(hfg.Node):
+    """Send how often it has ticked."""
+
+    tick = hfg.Event(int)
+    ticks = hfg.State(0)
+
+    @hfg.slot
+    def begin(self) -> None:
+        """Receive the activity."""
+
+    async def do(self) -> None:
+        """Tick while active."""
+        while True:
+            self.ticks += 1
+            self.tick.trigger(self.ticks)
+            await asyncio.sleep(0.02)
+
+
+class Heard(hfg.Node):
+    """Count what one hears."""
+
+    count = hfg.State(0)
+
+    @hfg.slot
+    def hear(self, number: int) -> None:
+        """Hear it."""
+        self.count += 1
+
+
+class Pace(hfg.Subgraph):
+    """Let numbers pass, multiplied as one says outside."""
+
+    rate = hfg.Parameter(3, Interval(ge=0, le=10))
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        """Multiply."""
+        times = graph.add(scaled(), name="times")
+        graph.connect(self.value.inner, times.value)
+        graph.connect(times.out, self.out.inner)
+
+
+def workshop() -> hfg.Graph:
+    """What editors of edges, gates and promotions need: signals, a loop, and a subgraph with a parameter."""
+    graph = hfg.Graph("workshop")
+    numbers = graph.add(count(), name="numbers", max_rate_hz=25)
+    pace = graph.add(Pace(), name="pace")
+    numbers >> pace >> graph.add(Collect(), name="store")
+    clock = graph.add(Clock(), name="clock")
+    graph.start.activates(clock.begin)
+    graph.connect(clock.tick, graph.add(Heard(), name="heard").hear)
+    graph.add(Drive(), name="drive")
     return graph

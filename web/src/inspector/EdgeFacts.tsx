@@ -1,9 +1,11 @@
 import { useEffect, useState } from "react";
 import type { Value } from "../protocol/types";
-import { disconnect, edit, makeActive, pin } from "../state/actions";
+import { disconnect, makeActive, pin } from "../state/actions";
 import { socket } from "../state/link";
 import { useStudio } from "../state/studio";
 import { rate } from "../ui/words";
+import { EdgeOptions } from "./EdgeOptions";
+import { StopEditor } from "./StopEditor";
 
 export function EdgeFacts({ edge: key }: { edge: string }) {
   const edge = useStudio((s) => s.tables.edges[key]);
@@ -13,11 +15,6 @@ export function EdgeFacts({ edge: key }: { edge: string }) {
     return socket.subscribe("value", { path: key }, 4, (next) => setValue(next as Value)).end;
   }, [key]);
   if (!edge) return null;
-  const capacity = edge.options.capacity;
-  const setCapacity = (text: string) => {
-    const number = Number(text);
-    if (Number.isInteger(number) && number > 0) void edit([{ do: "SetEdge", source: edge.source, target: edge.target, capacity: number }]);
-  };
   return (
     <>
       <div className="who">
@@ -48,24 +45,8 @@ export function EdgeFacts({ edge: key }: { edge: string }) {
           </button>
         </div>
       </div>
-      <div className="sec">
-        <h3>Settings</h3>
-        <div className="par">
-          <label htmlFor="capacity">capacity</label>
-          <div className="fld wide">
-            <input
-              id="capacity"
-              inputMode="numeric"
-              placeholder="as usual"
-              key={String(capacity)}
-              defaultValue={typeof capacity === "number" ? capacity : ""}
-              onBlur={(event) => event.target.value !== String(capacity ?? "") && setCapacity(event.target.value)}
-              onKeyDown={(event) => event.key === "Enter" && event.currentTarget.blur()}
-            />
-          </div>
-        </div>
-        {edge.through && edge.through.length > 0 && <p className="mono said">{JSON.stringify(edge.through, null, 1)}</p>}
-      </div>
+      <EdgeOptions edge={key} />
+      <StopEditor path={key} />
     </>
   );
 }

@@ -8,6 +8,8 @@ import { NodeHead } from "./NodeHead";
 import { Parameters } from "./Parameters";
 import { Placement } from "./Placement";
 import { Ports } from "./Ports";
+import { Promotions } from "./Promotions";
+import { StopEditor } from "./StopEditor";
 import { Probes } from "../probes/Probes";
 
 /** Whatever is selected, with all that can be seen and changed about it. */
@@ -46,6 +48,8 @@ function OfNode({ path }: { path: string }) {
       <Measured path={path} />
       <Ports path={path} />
       <Placement path={path} />
+      <Promotions path={path} />
+      <StopEditor path={path} />
     </>
   );
 }

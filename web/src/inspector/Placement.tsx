@@ -1,13 +1,12 @@
 import { edit } from "../state/actions";
-import { nameOf } from "../state/paths";
 import { useStudio } from "../state/studio";
 import type { Data } from "../protocol/types";
+import { GateEditor } from "./GateEditor";
 
 /** Where a node runs, whether it does, and what opens its gate. */
 export function Placement({ path }: { path: string }) {
   const node = useStudio((s) => s.tables.nodes[path]);
   const groups = useStudio((s) => s.tables.groups);
-  const gate = useStudio((s) => s.tables.gates[path]);
   if (!node) return null;
   const options = Object.entries(node.options).filter(([name]) => name !== "group");
   return (
@@ -39,17 +38,7 @@ export function Placement({ path }: { path: string }) {
           onChange={(event) => void edit([{ do: event.target.checked ? "Enable" : "Disable", path }])}
         />
       </div>
-      {gate && (
-        <div className="par">
-          <label>gate</label>
-          <span className="gated" title={`works only while ${gate.by} is active`}>
-            {gate.by === path ? "itself" : nameOf(gate.by)}
-            <button type="button" className="btn small" onClick={() => void edit([{ do: "Ungate", path }])}>
-              Take it away
-            </button>
-          </span>
-        </div>
-      )}
+      <GateEditor path={path} />
       {options.map(([name, value]) => (
         <Option key={name} name={name} value={value} />
       ))}

@@ -1,12 +1,19 @@
 import { type KeyboardEvent, useEffect, useState } from "react";
-import type { Fit, Targets } from "../protocol/types";
-import { connect, isSource, question, toast } from "../state/actions";
+import type { Command, Fit, Targets } from "../protocol/types";
+import { connect, edit, isSource, question, toast } from "../state/actions";
 import { change, useStudio } from "../state/studio";
 
 interface Row {
   port: string;
   says: string;
   off: boolean;
+  commands?: Command[];
+}
+
+/** Ports outside of the subgraph, and what leads there. */
+interface WaysOut {
+  rows: { port: string; commands: Command[] }[];
+  message: string;
 }
 
 /** Connects without a mouse: choose a port of the node, then one that takes it. */
@@ -15,17 +22,23 @@ export function Connect() {
   const ports = useStudio((s) => s.tables.nodes[path]?.ports);
   const [from, setFrom] = useState("");
   const [targets, setTargets] = useState<Targets | null>(null);
+  const [out, setOut] = useState<WaysOut | null>(null);
   const [index, setIndex] = useState(0);
   useEffect(() => {
     if (from === "") return;
+    question<WaysOut>("ways_out", { path: from }).then(setOut, () => undefined);
     question<Targets>("targets", { port: from, moving: "" }).then(setTargets, (error: Error) => toast(error.message, { kind: "bad" }));
   }, [from]);
   const rows: Row[] =
     from === ""
       ? (ports ?? []).map((port) => ({ port: port.path, says: `${port.kind} ${port.type}`, off: false }))
-      : Object.entries(targets?.ports ?? {})
-          .sort(([, a], [, b]) => ORDER.indexOf(a.fit) - ORDER.indexOf(b.fit))
-          .map(([port, fit]) => ({ port, says: says(fit), off: fit.fit === "refused" }));
+      : [
+          ...Object.entries(targets?.ports ?? {})
+            .sort(([, a], [, b]) => ORDER.indexOf(a.fit) - ORDER.indexOf(b.fit))
+            .map(([port, fit]) => ({ port, says: says(fit), off: fit.fit === "refused" })),
+          ...(out?.rows ?? []).map((row) => ({ port: row.port, says: "outside: the subgraph gets a port for it", off: false, commands: row.commands })),
+          ...(out?.message ? [{ port: "Outside", says: out.message, off: true }] : []),
+        ].sort((a, b) => Number(a.off) - Number(b.off));
   const close = () => change({ popover: null });
   const take = (row: Row | undefined) => {
     if (!row || row.off) return;
@@ -35,7 +48,8 @@ export function Connect() {
       return;
     }
     close();
-    void (isSource(from) ? connect(from, row.port, false) : connect(row.port, from, false));
+    if (row.commands) void edit(row.commands);
+    else void (isSource(from) ? connect(from, row.port, false) : connect(row.port, from, false));
   };
   const key = (event: KeyboardEvent) => {
     event.stopPropagation();

@@ -42,7 +42,6 @@ export interface EdgeRecord {
   active: boolean;
   options: Record<string, Data>;
   signal: boolean;
-  through?: Data[];
   back: boolean;
 }
 
@@ -198,6 +197,8 @@ export interface BreakpointRecord {
   hits: number;
   holds: boolean;
   condition: string;
+  when: { op: string; value: Data; field?: string } | null;
+  why_not: string;
 }
 
 export interface RunRecord {

@@ -1,7 +1,7 @@
 import type { Data } from "../../protocol/types";
 import { newGesture } from "../../state/actions";
 import { short } from "../../ui/words";
-import type { WidgetProps } from "../Parameter";
+import type { WidgetProps } from "../Field";
 
 export function Choice({ id, type, value, off, bad, set }: WidgetProps) {
   const options: Data[] = type.labels.length > 0 ? type.labels : (type.choices ?? []);

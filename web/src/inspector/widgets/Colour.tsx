@@ -1,6 +1,6 @@
 import { newGesture } from "../../state/actions";
 import type { Data } from "../../protocol/types";
-import type { WidgetProps } from "../Parameter";
+import type { WidgetProps } from "../Field";
 
 /** A colour as the parameter has it: "#rrggbb", or numbers from 0 to 255. */
 export function Colour({ id, value, off, set }: WidgetProps) {

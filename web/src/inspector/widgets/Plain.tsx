@@ -1,11 +1,9 @@
-import { useState } from "react";
 import { newGesture } from "../../state/actions";
 import type { Data } from "../../protocol/types";
-import type { WidgetProps } from "../Parameter";
+import type { WidgetProps } from "../Field";
 
 /** Any other kind, as data: lists, intervals, records. A trigger is a button. */
 export function Plain({ id, type, value, off, bad, set }: WidgetProps) {
-  const [wrong, setWrong] = useState(false);
   if (type.kind === "trigger") {
     return (
       <button id={id} type="button" className="btn line" disabled={off} onClick={() => set(true, newGesture())}>
@@ -17,15 +15,10 @@ export function Plain({ id, type, value, off, bad, set }: WidgetProps) {
   const text = JSON.stringify(value);
   const commit = (next: string) => {
     if (next === text) return;
-    try {
-      set(JSON.parse(next) as Data, newGesture());
-      setWrong(false);
-    } catch {
-      setWrong(true);
-    }
+    set(parsed(next), newGesture());
   };
   return (
-    <div className={`fld wide${bad || wrong ? " bad-field" : ""}${off ? " locked" : ""}`}>
+    <div className={`fld wide${bad ? " bad-field" : ""}${off ? " locked" : ""}`}>
       <input
         id={id}
         className="mono"
@@ -37,4 +30,13 @@ export function Plain({ id, type, value, off, bad, set }: WidgetProps) {
       />
     </div>
   );
+}
+
+/** What is no data is sent as the text that it is: the studio says what it expects. */
+function parsed(text: string): Data {
+  try {
+    return JSON.parse(text) as Data;
+  } catch {
+    return text;
+  }
 }

@@ -1,6 +1,6 @@
 import { type KeyboardEvent, type PointerEvent, useRef, useState } from "react";
 import { newGesture } from "../../state/actions";
-import type { WidgetProps } from "../Parameter";
+import type { WidgetProps } from "../Field";
 import { digits, niceStep, rangeOf, tidy } from "./range";
 
 /** At most so many values a second are sent while one drags; all of them are one step of the history. */

@@ -1,5 +1,5 @@
 import { newGesture } from "../../state/actions";
-import type { WidgetProps } from "../Parameter";
+import type { WidgetProps } from "../Field";
 
 export function TextField({ id, value, off, bad, set }: WidgetProps) {
   const text = typeof value === "string" ? value : value === null ? "" : String(value);

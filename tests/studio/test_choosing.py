@@ -1,0 +1,121 @@
+"""What editors offer comes from the studio: gates, promotions, options of edges, operators, ways out of a subgraph."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import hfg
+from tests.studio.page import Page, live, studio_of
+from tests.studio.stories.graphs import Drive, mission, workshop
+
+
+@pytest.mark.rule("A11")
+def test_a_gate_can_be_opened_by_the_node_itself_and_all_others_and_each_row_is_an_edit() -> None:
+    async def main() -> None:
+        page = Page(studio := studio_of(workshop())).join()
+        offered = await page.value("gates", path="store")
+        paths = [row["path"] for row in offered["rows"]]
+        assert paths[0] == "store"
+        assert {"drive", "pace/times"} < set(paths)
+        await page.edit(*next(row["commands"] for row in offered["rows"] if row["path"] == "drive"))
+        await page.edit(
+            *next(r["commands"] for r in (await page.value("gates", path="store"))["rows"] if r["path"] == "clock")
+        )
+        assert [gate.by.place.path for gate in studio.graph.gates] == ["clock"]
+        await page.edit(*(await page.value("gates", path="store"))["none"])
+        assert list(studio.graph.gates) == []
+
+    live(main)
+
+
+@pytest.mark.rule("G3")
+def test_a_promotion_that_does_not_fit_says_why() -> None:
+    async def main() -> None:
+        graph = hfg.Graph("g")
+        box = graph.add(Outside(), name="box")
+        page = Page(studio_of(graph)).join()
+        (offered,) = await page.value("promotions", path="box/drive")
+        rows = {row["name"]: row["message"] for row in offered["rows"]}
+        assert rows["speed"] == ""
+        assert "takes float" in rows["words"]
+        await page.edit(*offered["rows"][0]["commands"])
+        box.speed = 2.5
+        assert graph["box/drive"].duration == 2.5
+        assert (await page.value("promotions", path="box/drive"))[0]["by"] == "speed"
+
+    live(main)
+
+
+class Outside(hfg.Subgraph):
+    """Has a parameter that fits what is inside, and one that does not."""
+
+    speed = hfg.Parameter(1.0)
+    words = hfg.Parameter("none")
+
+    def build(self, graph: hfg.Graph) -> None:
+        graph.add(Drive(), name="drive")
+
+
+@pytest.mark.rule("P5")
+def test_an_edge_offers_only_the_options_it_can_have() -> None:
+    async def main() -> None:
+        page = Page(studio_of(workshop())).join()
+        of_data = await page.value("edge", path="pace.out -> store.value")
+        of_signals = await page.value("edge", path="clock.tick -> heard.hear")
+        assert [one["name"] for one in of_data["options"]] == ["buffer", "initial"]
+        assert [one["name"] for one in of_signals["options"]] == [
+            "capacity",
+            "overflow",
+            "capacity_limit",
+            "initial",
+            "through",
+        ]
+        assert of_data["anew"] == []  # it does not run, so its options can change
+
+    live(main)
+
+
+@pytest.mark.rule("P9")
+def test_every_operator_that_is_offered_can_be_said() -> None:
+    async def main() -> None:
+        page = Page(studio := studio_of(workshop())).join()
+        values = {"int": 1, "float": 0.1}
+        for one in await page.value("operators"):
+            given = {each["name"]: values[each["kind"]] for each in one["parameters"]}
+            said = {"type": one["reference"], "parameters": given}
+            answer = await page.edit(
+                {"do": "SetEdge", "source": "clock.tick", "target": "heard.hear", "through": [said]}
+            )
+            assert answer["t"] == "ack", answer
+            (edge,) = [each for each in studio.graph.edges if each.options.through]
+            assert one["name"] in repr(edge.options.through)
+
+    live(main)
+
+
+@pytest.mark.rule("G1")
+def test_a_subgraph_with_a_type_of_its_own_gets_no_ports_and_the_studio_says_so() -> None:
+    async def main() -> None:
+        page = Page(studio_of(mission())).join()
+        way: dict[str, Any] = await page.value("ways_out", path="errand/there.done")
+        assert way["rows"] == []
+        assert "its type Errand declares" in way["message"]
+        assert (await page.value("ways_out", path="scale.out")) == {"rows": [], "message": ""}
+
+    live(main)
+
+
+@pytest.mark.rule("R3")
+def test_a_condition_is_refused_at_a_node_and_the_breakpoint_that_was_there_stays() -> None:
+    async def main() -> None:
+        page = Page(studio_of(mission())).join()
+        assert (await page.value("stops", path="check"))["comparisons"] == []
+        assert (await page.value("stops", path="check.out"))["comparisons"][:2] == ["==", "!="]
+        await page.ask("break", path="check")
+        refused = await page.ask("break", path="check", condition={"op": ">", "value": 3})
+        assert "is a node, and a condition looks at what is sent" in refused["message"]
+        assert list(page.tables["breakpoints"]) == ["check"]
+
+    live(main)
