@@ -41,6 +41,7 @@ class Row(NamedTuple):
     active: bool
     errors: int
     doing: str
+    fused: bool
 
 
 class _Column(NamedTuple):
@@ -54,6 +55,7 @@ _COLUMNS: Final = (
     _Column("busy", 5, 8),
     _Column("queue", 5, 6),
     _Column("active", 6, 7),
+    _Column("fused", 5, 3),
     _Column("errors", 6, 5),
     _Column("now", 14, 4),
 )
@@ -105,6 +107,7 @@ class View:
                     node.active,
                     node.failed,
                     node.doing,
+                    node.fused,
                 )
             )
         return rows
@@ -165,7 +168,9 @@ class _Paint:
 def _body(shown: list[Row], rows: list[Row], paint: _Paint) -> list[str]:
     """The titles and a line for each row, in as many columns as there is room for."""
     longest = max(cell_len(row.path) for row in rows)
-    columns = [column for column in _COLUMNS if column.title != "errors" or any(row.errors for row in rows)]
+    absent = {"errors"} if not any(row.errors for row in rows) else set()
+    absent |= {"fused"} if not any(row.fused for row in rows) else set()
+    columns = [column for column in _COLUMNS if column.title not in absent]
     while columns:
         path_width = paint.width - sum(column.width + 2 for column in columns)
         if path_width >= min(longest, _NARROWEST_PATH):
@@ -187,13 +192,14 @@ def _cells(row: Row) -> dict[str, str]:
         "busy": _percent(row.busy_share),
         "queue": str(row.queued) if row.queued else "",
         "active": "yes" if row.active else "",
+        "fused": "yes" if row.fused else "",
         "errors": str(row.errors) if row.errors else "",
         "now": row.doing,
     }
 
 
 def _aligned(text: str, column: _Column) -> str:
-    if column.title in ("now", "active"):
+    if column.title in ("now", "active", "fused"):
         return text[: column.width].ljust(column.width)
     return text.rjust(column.width)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.resources import files
 from typing import Any, Final
 
@@ -57,6 +57,7 @@ class Page:
       outcome: how it ended; None while it runs.
       when: seconds since 1970 at its start; None in virtual time, so that equal runs have equal pages.
       own: sections that users have added, as HTML.
+      refused: why nodes cannot be fused, by path (`Run.explain`).
     """
 
     def __init__(
@@ -70,8 +71,9 @@ class Page:
         outcome: str | None,
         when: float | None,
         own: Sequence[str] = (),
+        refused: Mapping[str, str] | None = None,
     ) -> None:
-        self.graph, self.drawn, self.own = graph, drawn, own
+        self.graph, self.drawn, self.own, self.refused = graph, drawn, own, refused or {}
         self.observed, self.report, self.statistics = observed, report, statistics
         self.error, self.when = error, when
         self.outcome = outcome or "still running"
@@ -165,7 +167,10 @@ class Page:
         yield '<button type="button" id="smaller">-</button> <button type="button" id="larger">+</button>'
         yield '</span></div>\n<div class="picture" id="graph">'
         yield self.drawn[0]
-        yield "</div>\n</section>\n"
+        yield "</div>\n"
+        if self.refused:
+            yield "<p>Tinted nodes cannot be fused with others; the table of nodes says why.</p>\n"
+        yield "</section>\n"
 
     def _timeline(self) -> Iterator[str]:
         joined = sum(times.joined for times in self.observed.times.values())
@@ -196,6 +201,7 @@ class Page:
             "span": self.observed.rows.span_s,
             "counts": {path: list(row[:used]) for path, row in self.observed.rows.counts.items()},
             "groups": {path: one.group for path, one in self.statistics.nodes.items()},
+            "refused": self.refused,
         }
 
     # --- tables and pictures
@@ -218,11 +224,13 @@ class Page:
                     (latency.p99_s, _seconds(latency.p99_s) if latency.count else ""),
                     (one.queued, str(one.queued) if one.queued else ""),
                     (one.doing, one.doing),
+                    *([(self.refused.get(path, ""),) * 2] if self.refused else []),
                 )
             )
         heads = (
             *("node", "group", "firings", "silent", "calls", "failed", "active", "mean", "busy", "latency, 99 %"),
             *("queued", "in the end"),
+            *(["not fused because"] if self.refused else []),
         )
         yield '<section id="nodes"><h2>Nodes</h2>\n'
         yield from _table("nodes", heads, self._most("nodes", rows))

@@ -15,6 +15,10 @@
   for (const group of document.querySelectorAll(".picture g[data-path]")) {
     const rect = group.querySelector(":scope > rect"), path = group.getAttribute("data-path");
     if (rect) shapes.set(path, [...(shapes.get(path) ?? []), rect]);
+    if (rect && data.refused[path]) {
+      rect.classList.add("refused");
+      group.querySelector(":scope > title").textContent += "; not fused: " + data.refused[path];
+    }
   }
   const changes = [...new Set(data.active.flatMap((one) => one.spans.flat()))].sort((a, b) => a - b);
   let now = data.duration;

@@ -70,9 +70,19 @@ class ReportPage(Sections):
         run, observed = self._run, self._observed
         if observed.edits != self._edits:
             self._edits, self._drawing = observed.edits, drawing(run.graph)
-        numbers = run.report(), run.statistics()
-        own = self.sections()
-        return Page(run.graph, self._drawing, observed, *numbers, run.error, self._outcome, self._when, own).text()
+        refused = {path: one.reason for path, one in run.explain().items() if one.refused}
+        return Page(
+            run.graph,
+            self._drawing,
+            observed,
+            run.report(),
+            run.statistics(),
+            run.error,
+            self._outcome,
+            self._when,
+            self.sections(),
+            refused,
+        ).text()
 
 
 def report_page(run: Run, file: str | os.PathLike[str], *, pictures: int, picture_size: int) -> ReportPage:

@@ -78,6 +78,16 @@ def test_errors_have_a_column_when_there_are_some() -> None:
     assert lines[2].split() == ["node", "rate", "busy", "queue", "active", "errors", "now"]
 
 
+def test_fused_nodes_have_a_mark_when_there_are_some() -> None:
+    made = view(look(1.0, msgspec.structs.replace(node("a"), fused=True), node("b")))
+    assert [line.split() for line in made.lines(80, 24)[2:]] == [
+        ["node", "rate", "busy", "queue", "active", "fused", "now"],
+        ["a", "0", "0", "%", "yes", "rate"],
+        ["b", "0", "0", "%", "rate"],
+    ]
+    assert [row.fused for row in made.rows()] == [True, False]
+
+
 @pytest.mark.parametrize("columns", [1, 5, 20, 33, 47, 80, 200])
 @pytest.mark.parametrize("height", [1, 2, 4, 10, 50])
 def test_fits_into_any_terminal(columns: int, height: int) -> None:

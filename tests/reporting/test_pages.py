@@ -140,6 +140,20 @@ def test_a_page_has_tables_errors_and_pictures(tmp_path: Path) -> None:
     assert image[0, 0].tolist() == [2, 100, 200]
 
 
+def test_a_page_marks_the_nodes_that_cannot_be_fused_and_says_why(tmp_path: Path) -> None:
+    graph = mission()
+    eye = graph.add(camera())
+    graph.connect(eye.out, graph.add(look(), name="steady").image)
+    graph.connect(eye.out, graph.add(look(), name="again", retries=2).image)
+    page = page_of(graph, tmp_path / "run.html")
+    refused = data_of(page)["refused"]
+    assert list(refused) == ["again"]
+    assert "retries=" in refused["again"]
+    assert "Tinted nodes" in page
+    assert f"<td>{refused['again']}</td>" in page
+    assert "Tinted nodes" not in page_of(mission(), tmp_path / "run.html")
+
+
 def test_without_pictures_there_are_none(tmp_path: Path) -> None:
     assert "data:image" not in page_of(seen(mission()), tmp_path / "run.html", pictures=0)
 

@@ -307,6 +307,7 @@ def test_a_node_that_is_not_fused_has_a_reason(make: Callable[[], Any], options:
     explained = runs[0].explain()
     assert not explained["odd"].fused
     assert reason in explained["odd"].reason
+    assert [path for path, one in explained.items() if one.refused] == ["odd"]
     assert explained["first"].members == ("numbers", "first")
     assert runs[0].explain("odd") == {"odd": explained["odd"]}
 
@@ -319,4 +320,17 @@ def test_a_throttled_gate_and_a_run_without_fast_paths_are_named() -> None:
     for fast in (True, False):
         hfg.run(graph, clock="virtual", fast=fast, begin=runs.append)
     assert "idle_rate_hz=" in runs[0].explain()["b"].reason
-    assert {"fast=False" in one.reason for path, one in runs[1].explain().items() if path in "ab"} == {True}
+    assert "fast=False" in runs[1].explain()["a"].reason
+    assert not runs[1].explain()["a"].refused
+    assert runs[0].explain()["b"] == runs[1].explain()["b"]  # of itself, whatever else the run does
+
+
+def test_a_glance_says_who_is_fused() -> None:
+    graph = hfg.Graph()
+    chain(graph, forward(), forward())
+    runs: list[hfg.Run] = []
+    for fast in (True, False):
+        hfg.run(graph, clock="virtual", fast=fast, begin=runs.append)
+        fused = {node.path for node in runs[-1].glance().nodes if node.fused}
+        assert fused == {path for path, one in runs[-1].explain().items() if one.fused}
+        assert bool(fused) == fast

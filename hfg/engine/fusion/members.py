@@ -16,9 +16,13 @@ from hfg.ports.edges import SyncEdge
 __all__ = ["is_alive", "is_plain_and_fed", "lives_by_its_slots", "may_be_called", "may_be_inside", "refusal"]
 
 
-def refusal(worker: RunningNode) -> str:
-    """Say what keeps a node from being fused with any others, and what to do about it; "" if nothing does."""
-    return _looks(worker) or _of_the_group(worker) or _of_its_options(worker) or _of_its_ports(worker)
+def refusal(worker: RunningNode, *, declared: bool = False) -> str:
+    """Say what keeps a node from being fused, and what to do about it, or ""; `declared`: in the graph, for any run."""
+    reason = _of_the_group(worker) or _of_its_options(worker) or _of_its_ports(worker)
+    if not (reason or declared):
+        ended = any(edge.ended for edge in worker.in_edges)
+        return _looks(worker) or ("an optional input has ended (F4)" if ended else "")
+    return reason
 
 
 def _looks(worker: RunningNode) -> str:
@@ -86,8 +90,6 @@ def _of_its_ports(worker: RunningNode) -> str:
         return "a parameter of it is connected: set it with run.set, or make it an input or output"
     if any(worker.wants_token):
         return "its code takes tokens: take values"
-    if any(edge.ended for edge in worker.in_edges):
-        return "an optional input has ended (F4)"
     return "it is async and has events: use outputs, or a plain function" if worker.is_async and kind.events else ""
 
 

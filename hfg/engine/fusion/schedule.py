@@ -7,6 +7,7 @@ first. So the order is known before any value is: *static scheduling of synchron
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from typing import Any, TypeAlias
 
@@ -216,7 +217,7 @@ def _waits(turn: Turn, inside: Collection[RunningNode], order: Sequence[RunningN
     return key is not None and worker in inside and worker not in order
 
 
-def _enabled_by(worker: RunningNode, k: int, inside: set[RunningNode], left: dict[RunningNode, int]) -> list[Turn]:
+def _enabled_by(worker: RunningNode, k: int, inside: set[RunningNode], left: Counter[RunningNode]) -> list[Turn]:
     """Who is enabled by what member k sends, in the order of its edges; outsiders perhaps."""
     enabled: list[Turn] = []
     for number, (edge, _) in enumerate(_sending(worker)):
@@ -224,7 +225,7 @@ def _enabled_by(worker: RunningNode, k: int, inside: set[RunningNode], left: dic
         if not edge.depth_first:
             continue
         slot = edge.target_kind == "slot"
-        left[target] = left.get(target, 0) - (not slot)
+        left[target] -= not slot
         if slot or not left[target]:  # of a join the last token
             inner = target in inside and (not slot or is_only_called(target))
             enabled.append((target, None if inner else (k, number)))
@@ -242,11 +243,7 @@ def _depends_on_values(worker: RunningNode, inside: set[RunningNode], reached: d
     return False
 
 
-def _edges_left(inside: Collection[RunningNode]) -> dict[RunningNode, int]:
+def _edges_left(inside: Collection[RunningNode]) -> Counter[RunningNode]:
     """How many edges lead from members to each target: the last token of them may enable it."""
-    left: dict[RunningNode, int] = {}
-    for worker in inside:
-        for edge, _ in _sending(worker):
-            if edge.depth_first and edge.target_kind != "slot":
-                left[edge.target] = left.get(edge.target, 0) + 1
-    return left
+    edges = [edge for worker in inside for edge, _ in _sending(worker) if edge.depth_first]
+    return Counter(edge.target for edge in edges if edge.target_kind != "slot")

@@ -10,6 +10,7 @@ import time
 
 import msgspec
 
+from hfg.engine.fusion.explaining import is_fused
 from hfg.engine.observing.measuring import doing
 from hfg.engine.runtime.engine import Engine
 
@@ -31,6 +32,7 @@ class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
       under_way: how many of its firings are under way now.
       retries: how often a firing was tried again so far.
       age_s: how long ago its counts were taken, on the run's clock: a node of another process is as of its last report.
+      fused: whether its firings are part of a region's waves (`Run.explain`).
     """
 
     path: str
@@ -44,6 +46,7 @@ class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
     under_way: int = 0
     retries: int = 0
     age_s: float = 0.0
+    fused: bool = False
 
 
 class Glance(msgspec.Struct, frozen=True):
@@ -89,6 +92,7 @@ def glance_at(engine: Engine) -> Glance:
                 doing(worker),
                 worker.firings_under_way(),
                 worker.counts.retries,
+                fused=is_fused(worker),
             )
         )
     return Glance(
