@@ -10,6 +10,7 @@ import numpy.typing as npt
 import pytest
 
 import hfg
+from hfg.parts.running.part import Part
 
 
 @hfg.node
@@ -48,6 +49,16 @@ def brightness(picture: npt.NDArray[np.uint8]) -> float:
 @hfg.node
 def anything(value: int) -> Any:
     return value
+
+
+class Looks(hfg.Node):
+    """Says whether it is active when it fires."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> int:
+        return int(self.active)
 
 
 @hfg.node
@@ -128,3 +139,35 @@ def test_a_gate_between_two_processes_is_refused() -> None:
     graph.gate(graph["add"], by=graph["double"])
     with pytest.raises(hfg.errors.CheckFailed, match='it is gated by "double", and the two are in different processes'):
         hfg.run(graph, clock="virtual")
+
+
+@pytest.mark.rule("A10", "L1")
+def test_data_that_comes_before_a_part_begins_waits_until_start_is_on_its_edges(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    begin, receive = Part.begin, Part.receive
+    held: list[Part] = []
+    early: list[int] = []
+
+    def begin_later(part: Part) -> None:
+        if part.name == "far":
+            held.append(part)
+        else:
+            begin(part)
+
+    def begin_now(part: Part, label: str, tokens: list[Any]) -> None:
+        receive(part, label, tokens)
+        if held:
+            early.append(len(tokens))
+            begin(held.pop())
+
+    monkeypatch.setattr(Part, "begin", begin_later)
+    monkeypatch.setattr(Part, "receive", begin_now)
+    graph = hfg.Graph()
+    graph.group("far", process=True)
+    source, looks = graph.add(numbers(count=3)), graph.add(Looks(), group="far")
+    graph.connect(source.out, looks.value)
+    graph.connect(looks.out, graph.output("active", int))
+    graph.connect(graph.start, looks.activate, active=True)
+    assert hfg.run(graph, clock="virtual").outputs["active"] == [1, 1, 1]
+    assert early == [1]

@@ -272,12 +272,13 @@ def test_threads_beside_a_region_change_nothing_of_it(seed: int, monkeypatch: py
     check(note_calls(monkeypatch), seed, BESIDE_THREADS)
 
 
-def fused_order(graph: hfg.Graph, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def fused_order(graph: hfg.Graph, monkeypatch: pytest.MonkeyPatch, clock: Any = "virtual") -> list[str]:
     """In which order nodes were called, which is the same interpreted."""
     calls = note_calls(monkeypatch)
+    calls.timed = clock == "virtual"
     orders = []
     for fast in (True, False):
-        hfg.run(graph, clock="virtual", fast=fast)
+        hfg.run(graph, clock=clock, fast=fast)
         orders.append(calls.take()[0])
     assert orders[0] == orders[1]
     return [note[0] for note in orders[0]]

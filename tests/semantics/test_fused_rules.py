@@ -176,10 +176,15 @@ def same(value: int) -> int:
 
 
 @pytest.mark.rule("A5", "A3")
-def test_a_member_that_keeps_silent_gives_its_activity_away_with_what_it_sends_next(fast: bool) -> None:
+@pytest.mark.parametrize("group", [None, "work"])
+def test_a_member_that_keeps_silent_gives_its_activity_away_with_what_it_sends_next(
+    fast: bool, group: str | None
+) -> None:
     graph = hfg.Graph()
+    graph.group("work", threads=1)
     source, gives = graph.add(nodes.script(values=tuple(range(6)))), outside(graph, Gives())
-    head, keeps, looks = graph.add(same()), graph.add(nodes.some(), name="keeps"), graph.add(Looks())
+    head, keeps = graph.add(same(), group=group), graph.add(nodes.some(), name="keeps", group=group)
+    looks = graph.add(Looks(), group=group)
     graph.connect(source.out, gives.value)
     graph.connect(gives.out, head.value, active=True)
     graph.connect(head.out, keeps.value, active=True)
@@ -259,13 +264,29 @@ def test_who_stands_behind_a_member_that_leaves_its_wave_follows_at_once(monkeyp
     assert fused_order(graph, monkeypatch) == ["s", "f", "a", "b", "s", "f", "b", "s", "f", "a", "b", "s"]
 
 
+@pytest.mark.rule("R2", "P4")
+@pytest.mark.parametrize("clock", ["virtual", "real"])
+def test_who_takes_from_a_buffer_goes_before_the_next_wave(monkeypatch: pytest.MonkeyPatch, clock: Any) -> None:
+    graph = hfg.Graph()
+    source, awaits = graph.add(nodes.script(), name="s"), graph.add(nodes.calm(), name="a")
+    graph.connect(source.out, awaits.value)
+    graph.connect(awaits.out, graph.add(nodes.sink(), name="b").value, buffer=3)
+    begun_and_over = ["a", "a"]
+    assert fused_order(graph, monkeypatch, clock) == ["s", *begun_and_over, "b"] * 3 + ["s"]
+
+
 # --- who hears, and who waits
 
 
 @pytest.mark.rule("T4", "F6")
-def test_of_slots_that_listen_while_they_are_active_those_of_active_nodes_are_called(fast: bool) -> None:
+@pytest.mark.parametrize("relay", [nodes.double, nodes.calm])
+def test_of_slots_that_listen_while_they_are_active_those_of_active_nodes_are_called(fast: bool, relay: Any) -> None:
     graph = hfg.Graph()
-    source, relays, takes = graph.add(nodes.script()), graph.add(nodes.double()), graph.add(nodes.Tally(), name="takes")
+    source, relays, takes = (
+        graph.add(nodes.script()),
+        graph.add(relay(), name="relays"),
+        graph.add(nodes.Tally(), name="takes"),
+    )
     hearers = [graph.add(nodes.Attentive(), name=f"h{number}") for number in range(6)]
     graph.connect(source.out, relays.value)
     for hears in hearers:
@@ -276,7 +297,7 @@ def test_of_slots_that_listen_while_they_are_active_those_of_active_nodes_are_ca
     report = run(graph, fast)
     assert [report.nodes[f"h{number}"].calls for number in range(6)] == [0, 0, 4, 4, 0, 0]  # with `activate`
     assert takes.count == 3
-    assert {edge.sent for label, edge in report.edges.items() if label.startswith("double.out -> h")} == {4}  # with END
+    assert {edge.sent for label, edge in report.edges.items() if label.startswith("relays.out -> h")} == {4}  # with END
 
 
 @hfg.node

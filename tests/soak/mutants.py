@@ -16,11 +16,11 @@ _MEDDLING: Final = ("tests/semantics/test_fused_meddling.py",)
 _LOOKING: Final = ("tests/recording/test_fused.py", "-k", "not random")
 _BOUNDED: Final = ("tests/links/test_bounded.py",)
 _EXACT: Final = ("tests/links/test_exact.py",)
+_PARTS: Final = ("tests/parts/test_distributed_runs.py",)
 
 # The generators, which must find again what people once found.
 _GRAPHS: Final = ("tests/semantics/test_random_graphs.py", "-k", "oracle_permits")
 _FUSED: Final = ("tests/semantics/test_fused.py", "-k", "fused_interpreted_and_watched")
-_PROCESSES: Final = ("tests/parts/test_cut_in_processes.py",)
 _DEATHS: Final = ("tests/parts/test_losses_at_random.py",)
 _PLAYED: Final = ("tests/recording/test_playing.py", "-k", "recorded_on_the_real_clock")
 
@@ -145,7 +145,6 @@ MUTANTS: Final = (
         "writing",
         'stop += ["outputs.missing", "next_in_wave"]',
         'stop += ["outputs.missing"]',
-        _SENDING,
     ),
     _fused(
         "slots do not get their tokens first",
@@ -399,7 +398,7 @@ MUTANTS: Final = (
         "hfg/engine/runtime/borders.py",
         "if core.over or not core.started:",
         "if core.over:",
-        _PROCESSES,
+        _PARTS,
     ),
     Mutant(
         "an artificial deadlock is resolved only when nothing else is alive",
