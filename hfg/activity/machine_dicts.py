@@ -1,7 +1,7 @@
 """Reads dicts of the kind that the package `transitions` takes into descriptions of state machines.
 
 What such a dict can say besides states and transitions is code (conditions, callbacks) and has its place in nodes here,
-so it is refused rather than left out unseen. Stands on `description`.
+so it is refused rather than left out unseen. Depends on `description`.
 """
 
 from __future__ import annotations

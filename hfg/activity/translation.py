@@ -1,7 +1,7 @@
 """From a state machine to a graph and back: the construction of the paper's §5.3.3, normalised as rule A13 says.
 
 Each state is a node, the initial one too; each transition an event of its source and an active edge into its target.
-Letters come to all states over edges that are not active. Stands on `description`, `states` and the graph floor.
+Letters come to all states over edges that are not active. Depends on `description`, `states` and the graph floor.
 """
 
 from __future__ import annotations

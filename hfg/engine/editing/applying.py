@@ -1,6 +1,6 @@
 """Applies the diff of a plan, between firings of the nodes that are touched (rule R4).
 
-Afterwards the plan is what it would be if it were made anew, which the tests of edits compare, and so is its index.
+Afterwards the plan is what it would be if it were made again, which the tests of edits compare, and so is its index.
 Tokens on edges that are gone are returned or counted. The cost depends on the size of the diff only. Nothing here
 waits: no other code of the run sees a plan that is half changed.
 """
@@ -156,7 +156,7 @@ class _Applying(Placing):
         )
 
     def _say(self, edge: Any, way: FlatEdge) -> None:
-        """Give an edge that stays its new options."""
+        """Set the new options of an edge that stays."""
         if edge.active != way.active:
             edge.carry(way.active)
             self.touched[edge.source] = None
@@ -204,7 +204,7 @@ class _Applying(Placing):
     # --- gates
 
     def set_gates(self) -> None:
-        """Set gates anew if any may gate other nodes than before (A11); the cost depends on what they gate."""
+        """Set gates again if any may gate other nodes than before (A11); the cost depends on what they gate."""
         core, found = self.core, self.found
         some_moved = self.elsewhere or found.gone or found.boxes_gone or found.swapped
         if found.gates or (core.gates and some_moved):
@@ -278,7 +278,7 @@ class _Applying(Placing):
                 drain_left((edge,))
 
     def _derive_live(self) -> None:
-        """Derive which edges are live, from the subgraphs around their ends and on their way."""
+        """Derive which edges are live, from the subgraphs around their ends and between them."""
         edges = [edge for edge in self.found.old if edge in self.index.edges]
         for worker in self.elsewhere:
             edges += [*worker.edges_in(), *worker.all_out_edges()]

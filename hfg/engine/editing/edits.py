@@ -57,7 +57,7 @@ _Switched = dict[RunningNode, bool]
 
 
 class _Following:
-    """One edit, and what is known of it on its way into the run.
+    """One edit, and its state until it takes effect.
 
     Attributes:
       changes: what was done to the declared graph.

@@ -43,7 +43,7 @@ class _Dissolved(Mapping[Any, Any]):
 
 
 class Follower(EdgeFollower):
-    """Follows single edges, across the levels on their way.
+    """Follows single edges across levels.
 
     The numbers of nodes in its results mean nothing: `via` holds subgraphs, and a node is known by its port.
     """

@@ -43,7 +43,7 @@ class Placing:
         self.found = found
         self.come = come
         self.groups = groups
-        self.touched: dict[RunningNode, None] = {}  # their wiring is derived anew
+        self.touched: dict[RunningNode, None] = {}  # their wiring is derived again
         self.elsewhere: dict[RunningNode, None] = {}  # they are in other subgraphs than before
         self.refitted = {worker for worker, _, _ in found.swapped}
         self.scopes: dict[Scope, None] = {}  # something in them has changed
@@ -86,7 +86,7 @@ class Placing:
             self.touched[worker] = None
 
     def touch_ends(self, edge: Any) -> None:
-        """Derive the wiring of the nodes at both ends of an edge anew."""
+        """Derive the wiring of the nodes at both ends of an edge again."""
         self.touched |= {edge.source: None, edge.target: None}
 
     def is_refitted(self, edge: Any) -> bool:

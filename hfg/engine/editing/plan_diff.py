@@ -57,7 +57,7 @@ class PlanDiff(msgspec.Struct, eq=False):
       old: the running edges that were examined.
       ways: the edges that replace them, in order, each with the running edge that it continues, if any.
       lost: running edges that end.
-      gates: gates must be set anew.
+      gates: gates must be set again.
       touched: workers that must not fire meanwhile.
       doubtful: only a check of the whole graph can tell whether it is sound.
     """
@@ -217,7 +217,7 @@ class _Comparing:
     def _touched_edges(self) -> tuple[dict[Edge, Level | None], dict[Edge, Edge], set[Edge]]:
         """Return the edges that changes declare or delete, with the level where each is now.
 
-        Return also which edge one replaces, and which were deleted for good.
+        Return also which edge one replaces, and which were deleted permanently.
         """
         homes: dict[Edge, Level | None] = {}
         before: dict[Edge, Edge] = {}

@@ -67,7 +67,7 @@ def need_settable(engine: Engine, port: ParameterPort[Any], value: Any) -> list[
 
 
 def _write(worker: RunningNode, node: Node, name: str, value: Any) -> None:
-    """Give the node the value."""
+    """Pass the value to the node."""
     core = worker.core
     node._parameters[name] = own_copy(value)
     if core.trace_changes is not None:

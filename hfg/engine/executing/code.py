@@ -45,7 +45,7 @@ def run_as(worker: RunningNode) -> None:
 
 
 def answer(waiter: asyncio.Future[Any], value: Any) -> None:
-    """Give a waiting future its result, unless the waiter is gone."""
+    """Set the result of a waiting future, unless the waiter is gone."""
     if not waiter.done():
         waiter.set_result(value)
 

@@ -188,7 +188,7 @@ class ThreadGroup(Group):
         return moved
 
     def submit(self, job: Job) -> None:
-        """Give a thread a job; on the loop."""
+        """Pass a job to a thread; on the loop."""
         lane = self._idle.pop() if self._idle else self._new_lane()
         job.begin(lane, 0.0 if self.charges is None else self.clock())
         self.running += 1
@@ -261,7 +261,7 @@ class _Lane:
 
     def __init__(self, name: str, deliver: Callable[[deque[Any]], None], context: contextvars.Context) -> None:
         self.jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
-        self.job: Job | None = None  # under way
+        self.job: Job | None = None  # in progress
         self.given_up = False
         self._deliver = deliver
         self._out: deque[Any] = deque()

@@ -113,7 +113,7 @@ def _is_asked_for_by(worker: RunningNode, frame: FrameType | None) -> bool:
     while frame is not None:
         file = frame.f_code.co_filename
         if frame.f_code is _OF_THE_LOOP:
-            return False  # a server that the node has opened, a callback: the loop is at work, not the node
+            return False  # a server that the node has opened, a callback: the loop is running, not the node
         if file.startswith(_ANYIO) or frame.f_code is _OF_VIRTUAL_TIME:
             frame = frame.f_back
             continue

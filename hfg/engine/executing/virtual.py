@@ -147,7 +147,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         now = self._virtual_now
         if moment <= now < when:
             # Who asks again for a moment that has come by our count, but not by sums of floats of its own, as anyio's
-            # scopes with a deadline do, would ask for ever: time is to go on. What is due within the clock's resolution
+            # scopes with a deadline do, would ask forever: time is to go on. What is due within the clock's resolution
             # asyncio calls at once, so the smallest step is behind that.
             moment = max(round(now + 2 * _RESOLUTION_S, _DIGITS), now + 2 * math.ulp(now), when)
         timer = _Timer(next(self._timer_numbers), moment, callback, args, self, context)

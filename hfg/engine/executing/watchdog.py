@@ -18,7 +18,7 @@ from hfg.nodetypes.node import Node
 __all__ = ["Watch", "remedy_for", "watchdog"]
 
 _SLICE_S = 0.005  # how long the pump may keep the loop to itself where nodes are slow
-_LOOKS_WHILE_BUSY = 20  # quick looks after the loop was at work; then at leisure, so that an idle robot sleeps
+_LOOKS_WHILE_BUSY = 20  # quick looks after the loop was running; then at leisure, so that an idle robot sleeps
 _LOGGER = Log("hfg.engine")
 
 
@@ -36,7 +36,7 @@ class Watch:
         self.virtual = virtual
 
     def look(self, now: float) -> bool:
-        """Compare with the last look. Return whether the loop is at work; from any thread."""
+        """Compare with the last look. Return whether the loop is running; from any thread."""
         self._end_slice()
         worker = self._at_work()
         if worker is None:

@@ -1,6 +1,6 @@
 """What users hold in their hands: a run, its feeds and readers.
 
-running      run, run_async, running       composition  the engine and all that stands on it
+running      run, run_async, running       composition  the engine and all that depends on it
 run          what one can do with a run    outside      feeds, readers, signals
 """
 

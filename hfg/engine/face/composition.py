@@ -1,4 +1,4 @@
-"""A run put together: the engine, and all that stands on it, each handed what it needs (rules R3, R4, R7)."""
+"""A run put together: the engine, and all that depends on it, each handed what it needs (rules R3, R4, R7)."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Others(Protocol):
         """Here is the engine of the main part."""
 
     def face(self, graph: Graph) -> Any:  # noqa: ANN401 - a `Run`, which stands on this module
-        """Give the `Run` of all parts."""
+        """Return the `Run` of all parts."""
 
     async def open(self) -> None:
         """Begin the other parts and set them up.
@@ -50,7 +50,7 @@ class Others(Protocol):
         """Tear them down; nothing is left of them."""
 
     def failure(self) -> HfgError | None:
-        """Give what their teardown has failed with."""
+        """Return what their teardown has failed with."""
 
     def whole(self, report: Report) -> Report:
         """Put the report of the main part and theirs together."""

@@ -1,6 +1,6 @@
 """How code outside a graph brings tokens in and takes them out (rules P10, F8): feeds, readers, taps, signals.
 
-Stands on `engine`. Everything here is for the event loop of the run, except `Feed.send_from_thread`.
+Depends on `engine`. Everything here is for the event loop of the run, except `Feed.send_from_thread`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Running a graph to its end, or as long as a block lasts: `run`, `run_async`, `running` (rules R1, R5, R6).
 
-Stands on `run`.
+Depends on `run`.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def _need_begin(begin: object) -> None:
 
 
 def _refuse_endless(flat: FlatGraph) -> None:
-    """R6: under a virtual clock a source that never ends and waits for nothing would hold time still for ever.
+    """R6: under a virtual clock a source that never ends and waits for nothing would hold time still forever.
 
     Only where that is certain; else the engine notices that time has stood still for millions of firings.
     """

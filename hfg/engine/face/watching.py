@@ -161,7 +161,7 @@ async def watched(run: Run, watch: bool | str) -> AsyncIterator[None]:
 
 async def _close(server: asyncio.Server, listening: socket.socket, door: Door) -> None:
     # First nobody more is let in: a server that is closed loses whom it has let in but not made a connection
-    # of yet (asyncio asserts that it is open), and the door would wait for that guest for ever.
+    # of yet (asyncio asserts that it is open), and the door would wait for that guest forever.
     asyncio.get_running_loop().remove_reader(listening)
     await door.close()
     server.close()

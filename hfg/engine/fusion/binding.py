@@ -1,7 +1,7 @@
 """Compiles the text of a wave, and binds it to what its region consists of.
 
 Regions of one shape share their compiled code. The lines are known to `linecache`, so a traceback and a debugger show
-which node it is. Stands on `schedule` and `tap_writing`.
+which node it is. Depends on `schedule` and `tap_writing`.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Fusible(Protocol):
 
 
 class Text(Protocol):
-    """Who writes the text of a wave."""
+    """The writer of a wave's text."""
 
     measured: bool
     calls: dict[int, int]
@@ -97,7 +97,7 @@ def bind(region: Fusible, writer: Text, *, to: Any = None) -> Wave:
 
 
 class _Names:
-    """What the text of a wave takes from its region, by the number of the member."""
+    """Objects of the region that the text of a wave uses, by the number of the member."""
 
     def __init__(self, region: Fusible, measured: bool, taps: TapWriter) -> None:
         core = region.core
@@ -125,7 +125,10 @@ class _Names:
 
 
 def _code_of(worker: RunningNode) -> Any:
-    """What a call of the member runs; who measures wraps handlers, and measures functions by the wave."""
+    """Return the function that a call of the member runs.
+
+    Statistics wrap handlers; functions are measured by the wave itself.
+    """
     if is_only_called(worker):
         return worker.slot_edges[0].handler
     return worker.process if worker.meter is None else worker.meter.code
@@ -139,7 +142,10 @@ def _take_queued(edge: BufferEdge | EventEdge) -> Token[Any]:
 
 
 def _values(region: Fusible, k: int, result: Any) -> list[Any] | None:
-    """What member k has sent, or gives back, by output; None if that is not plain: a modifier or stamp, or twice."""
+    """Return the values that member k sent or returned, by output.
+
+    None if they are not plain: one has a modifier or a stamp, or an output was written twice.
+    """
     worker = region.order[k]
     written = worker.written
     if written is None:
@@ -187,7 +193,7 @@ def _compiled(text: str) -> CodeType:
 
 
 def _renamed(code: CodeType, name: str) -> CodeType:
-    """The same code under a name of its own, so that its lines can be told from those of other regions."""
+    """Return the same code under its own name, which distinguishes its lines from those of other regions."""
     constants = tuple(_renamed(one, name) if isinstance(one, CodeType) else one for one in code.co_consts)
     return code.replace(co_filename=name, co_consts=constants)
 
@@ -197,7 +203,7 @@ def _show(name: str, text: str, calls: dict[int, int], paths: list[str]) -> None
     shown = text.splitlines(keepends=True)
     for line, member in calls.items():
         shown[line - 1] = f'{shown[line - 1].rstrip()}  # node "{paths[member]}"\n'
-    linecache.cache[name] = (len(text), None, shown, name)  # at once: nobody asks a loader for a name in <>
+    linecache.cache[name] = (len(text), None, shown, name)  # now: linecache asks no loader for a name in <>
     _shown[name] = None
     while len(_shown) > _KEPT_SOURCES:
         oldest = next(iter(_shown))

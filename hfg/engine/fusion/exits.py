@@ -1,7 +1,7 @@
-"""Side exits: a wave ends amid its members, and the interpreted way goes on from there.
+"""Side exits: a wave ends before its last member, and the members continue one by one.
 
-What the locals of the wave hold is put on the edges, who is enabled by it in front of the run queue, and the firing
-under way is finished as any other. Stands on `turns`.
+The values in the wave's locals are put on the edges, the nodes that these enable go to the front of the run queue, and
+the current firing is finished like any other. Depends on `turns`.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ class Exits(Turns):
     _wave: Wave
 
     def leave(self, k: int, found: dict[str, Any]) -> object:
-        """Something about the firing of member k is not plain: what it gave back, or what happened meanwhile."""
+        """The firing of member k is not plain because of its result or because something happened meanwhile."""
         result = found[f"r{k}"] if f"r{k}" in found else found[f"v{k}_0"]
         if not (self.flags or self.called_off):
             self._note_exit(k)
         gave_way = self._rest()
         worker = self.materialise(k, found)
         if gave_way and self.core.over:
-            return None  # nobody hears of it any more
+            return None  # the run is over and ignores the result
         if k not in self.schedule.called:
             firing.complete_firing(worker, result)
         elif type(result) is CoroutineType:
@@ -56,7 +56,7 @@ class Exits(Turns):
         self._left()
 
     def stop(self, p: int, found: dict[str, Any]) -> None:
-        """Something has come up before the turn of member p: nobody is amid a firing."""
+        """Something has come up before the turn of member p, while no firing is in progress."""
         self._rest()
         self._go_by_rules(p, found)
         self.core.running_node = None
@@ -65,10 +65,10 @@ class Exits(Turns):
         self._left()
 
     def caught(self, error: BaseException, found: dict[str, Any]) -> None:
-        """Which call has raised is told by its line, so it costs nothing until it happens.
+        """A call has raised. The line says which one, so calls that do not raise pay nothing.
 
         Raises:
-          BaseException: what is no error of a node (Ctrl-C, and what ends a task or the program).
+          BaseException: if it is not an error of a node: Ctrl-C, or the end of a task or of the program.
         """
         gave_way = self._rest()
         traceback: Any = error.__traceback__
@@ -93,7 +93,7 @@ class Exits(Turns):
         return False
 
     def _left(self, gave_way: bool = False) -> None:
-        """The interpreted way goes on; `gave_way`: the wave had, to others."""
+        """The members continue one by one; `gave_way`: the wave had let others run."""
         assert not self.waiting, "who was enabled by the wave stands in the run queue"
         if self.doomed:
             self.dissolve()
@@ -107,7 +107,7 @@ class Exits(Turns):
         raise NotImplementedError
 
     def _note_exit(self, k: int) -> None:
-        """A member that is hardly ever plain is none: the region forms anew without it."""
+        """A member that is rarely plain does not pay: the region forms again without it."""
         self._exits[k] += 1
         waves = self.head.counts.firings + self.waves - self._formed_at
         if self._exits[k] >= _MOST_EXITS and self._exits[k] * 8 > waves:
@@ -115,7 +115,7 @@ class Exits(Turns):
             self.doomed = True
 
     def materialise(self, k: int, found: dict[str, Any]) -> RunningNode:
-        """Members before k have fired and k is amid its firing: let the interpreted way see it so."""
+        """Write down that the members before k have fired and that k is firing, as the rules record it."""
         self._go_by_rules(k, found, amid=True)
         worker, stamp = self.order[k], found["stamp"]
         if k in self.schedule.called:
@@ -129,10 +129,10 @@ class Exits(Turns):
         return worker
 
     def _let_go(self, k: int) -> None:
-        """Nobody waits for a member that was disabled meanwhile (F10).
+        """No node waits for a member that was disabled meanwhile (F10).
 
-        Those behind it may have all that they wait for, except for k and those who have their turns already. What the
-        head took is processed if nothing it has sent is waited for (F5).
+        The members after k may now have all that they wait for; k and the nodes already queued are excluded. The
+        head's input tokens are processed unless a token that it sent is unprocessed (F5).
         """
         if self.doomed:
             for worker in self.order[k + 1 :]:
@@ -165,8 +165,8 @@ class Exits(Turns):
     def _lay(self, edge: SyncEdge, to: int, value: object, stamp: float, *, carries: bool) -> bool:
         """Put what a local holds on the edge to member `to`; a slot is not called by a marker (T4).
 
-        If one end was disabled since, what was sent is discarded and counted (F10). What carries activity was a token
-        on the edge already, so that has been done by the rules.
+        If one end was disabled since, the token is discarded and counted (F10). A token with activity was on the edge
+        already, so the rules have discarded it.
         """
         target, called = self.order[to], to in self.schedule.called
         if value is None and called:

@@ -1,4 +1,4 @@
-"""Says of each node whether its firings are fused, with which others, and if not, why. Stands on `members`."""
+"""Says of each node whether its firings are fused, with which others, and if not, why. Depends on `members`."""
 
 from __future__ import annotations
 

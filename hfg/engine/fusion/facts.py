@@ -1,4 +1,4 @@
-"""What is known of the members of a region before the text of its wave is written. Stands on `binding`."""
+"""Facts about the members of a region, known before the text of its wave is written. Depends on `binding`."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class Facts:
         self.turns = region.takes_turns
         self.is_async = any(worker.is_async for worker in self.order)
         host: Any = region.core.runtime
-        self.real = host.time.epoch is not None  # time goes on while code runs
+        self.real = host.time.epoch is not None  # time passes while code runs
         self.loops = self.real and not self.head.paced and (self.is_source or self._one_queue())
         self.called = region.schedule.called
         self.senders = region.activity_senders
         self.single = [self._is_single(worker) for worker in self.order]
-        self.over_if_silent: set[int] = set()  # behind whose silence no code of the wave runs
+        self.over_if_silent: set[int] = set()  # members whose silence ends the wave
         self.taps = TapWriter(self.outs, self.say, real=self.real)
         self.forgets = bool(self._kinds()) and not self.is_async  # who gives way is not the one that was entered last
         self.last_calls = [f"c{len(self.order) - 1}"] if self.fires_with_slots(len(self.order) - 1) else []
@@ -57,7 +57,7 @@ class Facts:
         return len(self.entries) == 1 and type(self.entries[0]) is EventEdge
 
     def _is_single(self, worker: RunningNode) -> bool:
-        """What it gives back is the value of its one output, or nothing."""
+        """Whether it returns the value of its one output, or nothing."""
         plain = self.turns or not self._sends_itself(worker)
         return plain and self.position[worker] not in self.called and worker.type.result in ("none", "single")
 
@@ -92,7 +92,7 @@ class Facts:
     def _hands_over(self, k: int) -> bool:
         """Whether its activity can only go to the next member, and nothing but A(v) of the two follows (A5, A6).
 
-        Nobody has a turn between the two, so whether the token was ever on the edge makes no difference.
+        No node has a turn between the two, so it makes no difference whether a token was ever on the edge.
         """
         ways = [(edge, to) for edge, _, to in self.outs[k] if edge.active]
         if not self.turns or self.is_async or len(ways) != 1 or ways[0][1] != k + 1 or ways[0][0].tap is not None:
@@ -112,7 +112,7 @@ class Facts:
         return sorted({self.position[edge.source] for edge in edges if edge.active and k})
 
     def _may_take(self, k: int) -> bool:
-        """Whether what member k takes may carry activity, so that it is amid its firing from then on."""
+        """Whether a token that member k takes may carry activity, which makes the member busy from then on."""
         return bool(self._givers(k)) or (self.turns and not k and bool(self.entries))
 
     def _is_pending(self, k: int, j: int) -> bool:
@@ -122,9 +122,9 @@ class Facts:
         return j != k + 1 or j in self.schedule.between or self.fires_with_slots(k) or bool(self._odd_sending(k))
 
     def _silences_all_behind(self, k: int) -> bool:
-        """If it is silent, so is everybody behind it, and nothing of theirs or its own leaves the region or is seen.
+        """Whether all members after a silent member k are silent too, and none of these silences is observed outside.
 
-        Silence into a slot outside leaves nothing but a number (T4).
+        Silence into a slot outside only adds to a count (T4).
         """
         if len(self.order) == k + 1 or (not self.turns and not self.single[k]):
             return False
@@ -143,7 +143,7 @@ class Facts:
         return len(silent) == len(self.order) - k and not seen and not leaves
 
     def _is_over_by_silence(self, k: int) -> bool:
-        """Whether the silence of member k ends the wave, whatever else there is: all behind are silent by it."""
+        """Whether the silence of member k always ends the wave, because it silences all later members."""
         called = any(self.fires_with_slots(j) for j in range(k, len(self.order)))
         return not called and not self._may_take(k) and self._silences_all_behind(k)
 

@@ -1,4 +1,4 @@
-"""The text of one firing in a wave: is it silent, what does it run, and what leaves with it. Stands on `facts`."""
+"""The text of one firing in a wave: whether it is silent, what it runs, and what it sends. Depends on `facts`."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class FiringText(Facts):
         return value if edge.mandatory else f"(d{k}_{at} if {value} is None else {value})"
 
     def _may_be_silent(self, value: str) -> bool:
-        """Whether the wave can go on with this value missing; else it has ended for all behind it."""
+        """Whether the wave can continue with this value missing; otherwise it has ended before this member."""
         return int(value[1:].partition("_")[0]) not in self.over_if_silent
 
     # --- a firing ---------------------------------------------------------------------------------------------------
@@ -120,7 +120,7 @@ class FiringText(Facts):
             self.say(f"if {asked}: region.receive_at(0, ({', '.join(tokens)},), stamp)")
 
     def _be_silent(self, k: int) -> bool:
-        """A silent firing; whether the wave is over by it, for all behind are silent as well."""
+        """Write a silent firing. Return whether it ends the wave, because all later members are silent too."""
         say, worker = self.say, self.order[k]
         self._meet(k, "mute")
         if self._silences_all_behind(k) and not self.fires_with_slots(k):
@@ -141,7 +141,7 @@ class FiringText(Facts):
         return False
 
     def _over_by_silence(self, k: int, count: str, odd: list[str]) -> None:
-        """All behind member k are silent, so the wave is over; not while calls wait there, for those have places.
+        """The wave is over, because all members after k are silent; unless calls wait there, which have their turns.
 
         Args:
           k: the member.
@@ -170,7 +170,7 @@ class FiringText(Facts):
             self.indent -= 1
 
     def _call(self, k: int, call: str, *, within: bool) -> None:
-        """Call a member, look at what it gives back, and let that leave."""
+        """Call a member, check its result, and send it."""
         worker = self.order[k]
         if not k and self.head.options.max_rate_hz and not self.head.group.threaded:  # silent ones do not count (F11)
             self.say("worker.rate.start(now(), worker.options.max_rate_hz)")
@@ -196,12 +196,12 @@ class FiringText(Facts):
     def _measure(self, k: int) -> None:
         self.say("ended = monotonic()")
         delay = "" if self.is_source and not k else ", ended + epoch - stamp" if self.real else ", now() - stamp"
-        if self.order[k].is_async:  # while it waited others ran: that kept nobody busy
+        if self.order[k].is_async:  # while it waited, others ran, so it kept none of them waiting
             delay = f"{delay or ', None'}, 0.0 if region.detached or region.amid else None"
         self.say(f"took{k}(ended - began{delay})")
 
     def _announce(self, k: int) -> None:
-        """What the member's code sends by itself is to find that the worker runs."""
+        """Say that the member runs, because its code may send by itself."""
         self.say(f"core.running_node = w{k}; w{k}.busy = 'firing'; w{k}.stamp = stamp")
 
     def _unusual(self) -> str:
@@ -230,7 +230,7 @@ class FiringText(Facts):
         self.indent -= 1
 
     def _end_if_silent(self, k: int) -> None:
-        """The member has nothing to say, and all behind are silent by that."""
+        """The member is silent, which silences all later members."""
         worker = self.order[k]
         if worker.shape.announced or self.fires_with_slots(k) or not self._silences_all_behind(k):
             return
@@ -277,11 +277,11 @@ class FiringText(Facts):
         raise NotImplementedError
 
     def _send(self, k: int) -> None:
-        """What a firing has given leaves; where activity goes along, or something is told, the region sees to it."""
+        """Send the results of a firing; the region does it where activity leaves too or events follow."""
         say, worker = self.say, self.order[k]
         writes = self._sends_itself(worker)
         if writes and worker.out_names and not self.single[k]:
-            say(f"w{k}.written = None")  # behind the last guard: a side exit would not find it
+            say(f"w{k}.written = None")  # after the last guard: a side exit would not find it
         odd = self._odd_sending(k)
         if not odd:
             self._put(k)
@@ -311,14 +311,14 @@ class FiringText(Facts):
             self._finish(k)
 
     def _finish(self, k: int) -> None:
-        """Its firing is over: what it was to tell behind that follows, and the right of A3 ends."""
+        """Its firing is over: its automatic events follow, and the right of A3 ends."""
         if self.turns and not self._odd_sending(k):
             self.say(f"if w{k}.events_due: region.finish({k})")
             self.say(f"w{k}.may_carry = False")
         self.say(f"w{k}.busy = {self._amid()}; w{k}.stamp = None")
 
     def _put(self, k: int, *, silent: bool = False) -> None:
-        """Over the border of the region; who looks at an edge inside sees a token, which nobody else needs."""
+        """Put tokens on the edges that leave the region. Inside, only a tap gets one."""
         heard: set[int] = set()
         for number, (_, output, to) in enumerate(self.outs[k]):
             value = "NO_MESSAGE" if silent else f"NO_MESSAGE if v{k}_{output} is None else v{k}_{output}"
@@ -368,12 +368,12 @@ class FiringText(Facts):
                 say(f"if c{j}: region.expect({j})")
                 say(f"else: w{j}.queued = True")
             else:
-                say(f"w{j}.queued = True")  # what calls it now has its place behind its firing (F9)
+                say(f"w{j}.queued = True")  # calls that come now have their turn after its firing (F9)
 
     def _fired(self, k: int) -> None:
         """The firing is over: calls that came meanwhile have their places."""
         if not self.fires_with_slots(k):
             return
         self.taps.emit()
-        if k + 1 < len(self.order):  # behind the last one the head has its place first, which is freed by that (F5)
+        if k + 1 < len(self.order):  # after the last one, the head goes first, because its outputs are free then (F5)
             self._stops_if(f"c{k}", f"region.call_again({k})", k + 1)

@@ -1,9 +1,10 @@
-"""Regions with async members: code that only lets others have a turn (`sleep(0)`) goes on within its wave.
+"""Regions with async members: code that only lets others have a turn (`sleep(0)`) continues within its wave.
 
-Until the wave is over all members are busy, as in a thread: who wants one of them waits, and calls the wave off behind
-its present call. Code that waits for more becomes a firing like any other. No outsider has a turn amid such a wave.
+All members are busy until the wave is over, as in a thread. An edit that needs one of them calls the wave off, and
+waits for its present call. Code that waits for more than its turn becomes a firing like any other. Outsiders have no
+turns during such a wave.
 
-Stands on `region`.
+Depends on `region`.
 """
 
 from __future__ import annotations
@@ -24,11 +25,11 @@ __all__ = ["AsyncRegion"]
 
 
 class AsyncRegion(Region):
-    """A head and those that fire behind it in one wave, some of them async.
+    """A head and the nodes that fire after it in one wave, some of them async.
 
     Attributes:
-      amid: "", or "wave" while the wave under way has given way to others and all members are busy.
-      detached: the call under way waits, and goes on as a firing like any other.
+      amid: "", or "wave" while the current wave lets others run and all members are busy.
+      detached: the current call waits, and continues as a firing like any other.
     """
 
     def __init__(self, schedule: Schedule, respecialise: Callable[[RunningNode], None]) -> None:
@@ -43,7 +44,7 @@ class AsyncRegion(Region):
     @override
     def _call_off(self, why: str) -> None:
         self.called_off = True
-        if not self.amid:  # else the flags are those of somebody else
+        if not self.amid:  # else the flags belong to another wave
             self.flags.append(why)
 
     @override
@@ -61,7 +62,7 @@ class AsyncRegion(Region):
         self.running = False
         self.waves += done
         if self.amid and self.core.over:
-            return  # nobody hears of it any more
+            return  # the run is over and ignores the result
         called_off, self.called_off = self.called_off, False
         gave_way = self._rest()
         self._over()
@@ -92,7 +93,7 @@ class AsyncRegion(Region):
             self._go_on(called_off=True)
 
     def start(self, waves: CoroutineType[Any, Any, Any]) -> None:
-        """Run a wave in which there is async code, with the identity of a task: once a wave, not once a call.
+        """Run a wave with async code under the identity of one task per wave, not one per call.
 
         A call that really waits becomes a firing like any other; the wave's coroutine stays around it.
         """
@@ -110,7 +111,7 @@ class AsyncRegion(Region):
         self.amid = "wave"
         self.called_off = bool(self.flags)  # raised by the call before it gave way; the flags are cleared meanwhile
         for worker in self.order:
-            if worker.busy != "firing":  # else its call, under way, was announced
+            if worker.busy != "firing":  # else its current call was announced
                 worker.be_in_wave(self.amid)
         code = self.core.code
         lender.begin_async()
@@ -119,7 +120,7 @@ class AsyncRegion(Region):
         self.core.running_node = None
 
     def sent_on(self) -> None:
-        """What has left the wave that gives way is on its way, and the head waits for it."""
+        """Tokens have left a wave that lets others run: deliver them; the head waits for them."""
         if self.core.next_in_wave:
             self.queue_turns(self.schedule.next_in_wave)
             self.core.runtime.kick()
@@ -127,9 +128,9 @@ class AsyncRegion(Region):
             self.head.drop_firing()
 
     def _detach(self) -> None:
-        """The call under way waits for more than its turn: from here on it is a firing like any other."""
+        """The current call waits for more than its turn: from here on it is a firing like any other."""
         if self.detached:
-            return  # it was told before
+            return  # it knows already
         lender = self._lender
         k, found = self._place()
         worker = self.order[k]
@@ -157,7 +158,7 @@ class AsyncRegion(Region):
 
     @override
     def _rest(self) -> bool:
-        """Nobody's code is under way any more but that of the present call, if any."""
+        """No code is running any more except the present call, if any."""
         if not self.amid:
             return False
         self.amid = ""

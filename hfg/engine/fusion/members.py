@@ -1,8 +1,8 @@
 """Which running nodes may be members of a fused region, and which may lead one; and if not, why.
 
-A member's firings are calls of its function, and what a wave can look at besides. What else a firing may be asked to do
-(`ready()`, a time limit, retries, somebody who looks) is for the interpreted way. Each refusal is a reason with its
-remedy, for `explaining`. Stands on the model.
+A firing of a member is a call of its function plus the checks that a wave can make. A node whose firings need more
+(`ready()`, a time limit, retries, an observer) is not fused. Each refusal is a reason with its remedy, for
+`explaining`. Depends on the model.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def refusal(worker: RunningNode, *, declared: bool = False) -> str:
 
 
 def _looks(worker: RunningNode) -> str:
-    """Of a run or node that somebody looks at step by step: so each firing is to be seen by itself."""
+    """Of a run or node that is inspected step by step, so that each firing must be seen by itself."""
     core = worker.core
     if not core.fast:
         return "the run interprets every firing: leave out fast=False"
@@ -96,7 +96,7 @@ def _of_its_ports(worker: RunningNode) -> str:
 def is_alive(worker: RunningNode) -> bool:
     """Whether more than its inputs decides what a firing does, or more than its outputs leaves with it.
 
-    Only a wave on the loop looks at that, and none in which async code gives way to others.
+    Only waves on the loop check this, and not those in which async code lets others run.
     """
     return bool(worker.slot_edges or worker.gates_over or worker.shape.announced)
 
@@ -133,7 +133,7 @@ def may_be_called(worker: RunningNode) -> bool:
 
 
 def lives_by_its_slots(worker: RunningNode) -> bool:
-    """Its calls may go the fast path: nobody looks, and nothing depends on its activity but itself."""
+    """Whether its calls may take the fast path: it is not observed, and only itself depends on its activity."""
     options, core = worker.options, worker.core
     if options is None or worker.group.threaded or worker.is_source or worker.in_edges or worker.within is not None:
         return False
@@ -144,7 +144,7 @@ def lives_by_its_slots(worker: RunningNode) -> bool:
 
 
 def is_plain_and_fed(worker: RunningNode) -> bool:
-    """Whether it is a source, or a function with an edge into each input that it waits for, and nobody looks."""
+    """Whether it is a source, or a function with an edge into each mandatory input, and is not observed."""
     if worker.type is None or worker.process is None or refusal(worker):
         return False
     if worker.slot_edges and not _waits_after_firing(worker):
@@ -157,7 +157,7 @@ def is_plain_and_fed(worker: RunningNode) -> bool:
 
 
 def _waits_after_firing(worker: RunningNode) -> bool:
-    """Whether its next firing is never enabled before its outputs are processed: calls that come amid it go first.
+    """Whether its next firing is only enabled when its outputs are processed: calls that come meanwhile go first.
 
     Where nothing waits for what it sends, its next firing has its place when this one begins, before those calls (F9).
     """

@@ -3,19 +3,20 @@
 *Operator fusion* with *guards* and *side exits*, as in a tracing JIT. Inside of a wave there are no tokens, barriers or
 run queues; outside of one the members look as the rules leave them. What keeps that true:
 
-- **arm**: before a wave that follows something unusual one looks whether everything inside rests and nobody there
-  could pass activity on. From then on the output barrier of the head stands for those of all members: a token that has
-  left the region counts at the head (`Edge.waits`), for until it is processed no member can fire again anyway (F5).
+- **arm**: before a wave that follows something unusual, the region checks that everything inside rests and that no
+  member could pass activity on. From then on, the output barrier of the head stands for those of all members: a token
+  that has left the region counts at the head (`Edge.waits`), because no member can fire again until it is processed
+  (F5).
 - **disturb**: whoever changes what a wave takes for granted (blocks a member, makes it active, waits for it) says so
   to the worker, and the region is disarmed: what the members would say is written down, and the interpreted way goes
   on.
 - **side exit**: when a call brings what is not plain (an error, a token, code that waits) or a flag is up, the wave
-  ends behind that call: what the locals hold is put on the edges, who is enabled by it in front of the run queue, and
-  the firing under way is finished as any other.
-- **turns**: what others do amid a wave, and activity that moves in it, does not end it; see `turns`.
-- **dissolve**: whenever wiring or somebody's interest changes, `specialise` is asked, and the region is gone.
+  ends after that call: the values in the locals are put on the edges, the nodes that these enable go to the front of
+  the run queue, and the current firing is finished like any other.
+- **turns**: turns of others during a wave, and activity that moves in it, do not end it; see `turns`.
+- **dissolve**: whenever the wiring or the observers of a member change, `specialise` dissolves the region.
 
-Counts follow from the number of waves; who reads them has them settled first. Stands on `exits` and `writing`.
+Counts follow from the number of waves; readers have them settled first. Depends on `exits` and `writing`.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ __all__ = ["Region"]
 
 
 class Region(Exits):
-    """A head and those that fire behind it in one wave.
+    """A head and the nodes that fire after it in one wave.
 
     Attributes:
       step: what the head's step is while the region lasts.
@@ -98,16 +99,16 @@ class Region(Exits):
         return True
 
     def decline(self, worker: RunningNode) -> None:
-        """The head's next piece of work is not a plain wave; a call of it leaves those behind it as they are."""
+        """The head's next piece of work is not a plain wave; a slot call does not concern the other members."""
         if worker.fireable and not (worker.calls and worker.calls_before):
             self.disarm()
         firing.step(worker)
 
     def over(self, done: int) -> None:
-        """So many waves have run to their end."""
+        """Waves have run to their end: `done` of them."""
         self.running = False
         self.waves += done
-        if self.called_off:  # behind the last guard, by what a member has sent
+        if self.called_off:  # after the last guard, because of a token that a member has sent
             self.called_off = False
             self.disarm()
         self._over()
@@ -124,7 +125,7 @@ class Region(Exits):
         elif core.next_in_wave or self.waiting or self._first:
             self.queue_turns(self.schedule.next_in_wave)
         if head.outputs.missing or head.inputs.missing:
-            head.drop_firing()  # what came in while the wave ran gave it a place; F1 does not hold behind the wave
+            head.drop_firing()  # tokens that came while the wave ran gave it a place; F1 does not hold after the wave
         if head.outputs.missing:
             head.hold(self.held_entries)
         elif self.held_entries:
@@ -136,10 +137,10 @@ class Region(Exits):
 
     def _let_all_go(self, head: RunningNode) -> None:
         """Nothing the head has sent is waited for, so what it took is processed (F5)."""
-        if len(self.order) > 1:  # those behind it freed its outputs, when its own firing was over
+        if len(self.order) > 1:  # the later members freed its outputs, when its own firing was over
             agenda.consider(head)
             release(self.held_entries)
-        elif self.ending:  # the END that may come of it finds the head amid its firing, and enables it by its end (F1)
+        elif self.ending:  # an END that follows must find the head busy, so that the end of the firing enables it (F1)
             head.be_in_wave()
             release(self.held_entries)
             agenda.idle_again(head)
@@ -147,7 +148,7 @@ class Region(Exits):
             release(self.held_entries)
 
     def measure_on(self) -> None:
-        """What was measured has been read: measure the next waves; one may be under way."""
+        """Measurements have been read: measure the next waves; one may be in progress."""
         if self._measured is not None and self.head.step is self.step:
             self._go_by(self._measured)
 
@@ -170,20 +171,20 @@ class Region(Exits):
 
     @override
     def called_at(self, code: CodeType, line: int) -> int | None:
-        """Which member a line calls. The wave under way need not be the one that is next, see `measure_on`."""
+        """Which member a line calls. The current wave may have another text than the next, see `measure_on`."""
         return next((wave.calls.get(line) for wave in self._waves() if wave.code is code), None)
 
     def _waves(self) -> list[Wave]:
         return [wave for wave in (self._plain, self._measured) if wave is not None]
 
     def is_calling(self, worker: RunningNode) -> bool:
-        """Whether the call of this member is the one under way in a running wave."""
+        """Whether a running wave is in the call of this member."""
         return self.running and self.at_work(sys._getframe(1)) is worker  # noqa: SLF001 - of frames nobody else knows
 
     def is_sending(self, worker: RunningNode) -> bool:
         """A member sends by itself, which a plain call does not: whether it is the one whose call runs.
 
-        It leaves the wave behind this call, and the next region says before each of its calls that it runs.
+        The wave ends after this call, and the next region says before each call of the member that it runs.
         """
         if self.schedule.position[worker] in self.schedule.called or not self.is_calling(worker):
             return False  # (what a slot handler may not do is for others to say)
@@ -193,5 +194,5 @@ class Region(Exits):
         return True
 
     def abandon(self) -> RunningNode:
-        """The wave under way does not come back; one on the loop always does."""
+        """The current wave does not come back; one on the loop always does."""
         return self.head

@@ -1,8 +1,8 @@
 """The static schedule of a region: who fires after whom in a wave, found by running rule R2 once without values.
 
-At rest each member of a region fires exactly once a wave, silent or not, and over sequential edges R2 prescribes depth
-first. So the order is known before any value is: *static scheduling of synchronous data flow* (Lee and Messerschmitt,
-1987). Stands on `members`.
+At rest, each member of a region fires exactly once per wave, silent or not, and over sequential edges R2 prescribes
+depth first. So the order is known before any value is: *static scheduling of synchronous data flow* (Lee and
+Messerschmitt, 1987). Depends on `members`.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Schedule:
         return bool(self.order[k].slot_edges) and k not in self.called
 
     def may_give_way(self) -> bool:
-        """Whether no other member could fire while async code of one waits: then the wave may go on behind it."""
+        """Whether no other member could fire while async code of one waits: then the wave may continue after it."""
         return not any(
             worker.is_async and any(key is None for _, key in self.behind[k]) for k, worker in enumerate(self.order)
         )
@@ -136,7 +136,7 @@ def _sending(worker: RunningNode) -> list[tuple[Any, int]]:
 
 
 def _closure(head: RunningNode) -> set[RunningNode]:
-    """The head and everybody whose inputs all come from here, at most `MOST_MEMBERS`.
+    """Return the head and all nodes whose inputs all come from the region, at most `MOST_MEMBERS`.
 
     Async members and those that are alive do not go together: it is the async ones that stay outside.
     """
@@ -177,7 +177,7 @@ def _found(head: RunningNode, fits: Callable[[RunningNode], bool]) -> set[Runnin
 
 
 def _is_inside_another(worker: RunningNode, inside: set[RunningNode]) -> bool:
-    """Whether it belongs to a region whose head is not taken in, or whose wave is under way."""
+    """Whether it belongs to a region whose head is not taken in, or whose wave is in progress."""
     region = worker.region
     return region is not None and (region.running or not (region.head is worker or region.head in inside))
 
@@ -218,7 +218,7 @@ def _waits(turn: Turn, inside: Collection[RunningNode], order: Sequence[RunningN
 
 
 def _enabled_by(worker: RunningNode, k: int, inside: set[RunningNode], left: Counter[RunningNode]) -> list[Turn]:
-    """Who is enabled by what member k sends, in the order of its edges; outsiders perhaps."""
+    """Return the nodes that a sending of member k enables, in the order of its edges; outsiders only perhaps."""
     enabled: list[Turn] = []
     for number, (edge, _) in enumerate(_sending(worker)):
         target: RunningNode = edge.target
@@ -233,7 +233,7 @@ def _enabled_by(worker: RunningNode, k: int, inside: set[RunningNode], left: Cou
 
 
 def _depends_on_values(worker: RunningNode, inside: set[RunningNode], reached: dict[RunningNode, bool]) -> bool:
-    """Whether the place of somebody behind it does: a call by silence never comes, another token may."""
+    """Whether the place of a later node depends on it: silence never calls a slot, another token may."""
     for edge, _ in _sending(worker):
         if edge.depth_first and edge.target not in inside:
             calls = edge.target_kind == "slot"

@@ -2,7 +2,7 @@
 
 Closures in which everything that cannot change between two edits is a local. They are only a shortening: under every
 condition they do not cover they hand over to `sending.trigger` and `firing.step`, whose outcome they must equal
-(property: engine = oracle with `fast` on and off). Stands on `firing`.
+(property: engine = oracle with `fast` on and off). Depends on `firing`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def calls_step(worker: RunningNode) -> Step:
         if calls:
             steps[calls[0]](worker)
             if worker.is_next and not (worker.busy or worker.queued):
-                worker.clear_next()  # it stood in the queue for this call alone (R2)
+                worker.clear_next()  # it stood in the queue only for this call (R2)
         else:
             general(worker)
 
@@ -59,8 +59,8 @@ def _call_step(worker: RunningNode, edge: SyncEdge | EventEdge) -> Step:
 def _signal_step(group: Group, core: Core) -> Step:
     """Signals into slots whose handlers take the value: one step for all nodes of a group that live by such slots.
 
-    Being the same for all, it goes on with the next of them in the run queue by itself: a *row of calls*, in which
-    others have their turns too, and which ends where the pump would look round.
+    Because it is the same for all, it takes the next of them from the run queue itself: a *row of calls*, in which
+    others have their turns too, and which ends where the pump would check timers and other groups.
     """
     if group.signal_step is not None:
         return group.signal_step
@@ -74,7 +74,7 @@ def _signal_step(group: Group, core: Core) -> Step:
         own: Step = step  # who is called here goes this way, whatever else it may do in turns of its own
         try:
             while True:
-                if own is not step:  # a source, say: the row goes on behind it
+                if own is not step:  # a source, say: the row continues after it
                     amid = True
                     own(worker)
                     amid = False
@@ -174,9 +174,9 @@ def _waits(worker: RunningNode, edge: AnyEdge, coroutine: CoroutineType[Any, Any
 
 
 def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None]:
-    """What a port's `trigger` does: the fast path for one plain edge into a slot that nobody watches.
+    """Return the function behind a port's `trigger`: the fast path if one plain, unobserved edge leads into a slot.
 
-    Else `sending.trigger`.
+    Otherwise `sending.trigger`.
     """
     interpreted = _interpreted_emitter(event)
     if plainly or not event.worker.core.fast or len(event.edges) != 1 or not _may_be_short(event, event.edges[0]):
@@ -189,7 +189,7 @@ def _may_be_short(event: RunningEvent, edge: EventEdge) -> bool:
         edge.target_kind == "slot"
         and not edge.while_active
         and edge.overflow == "wait"
-        and edge.capacity > 1  # one signal alone fills no queue
+        and edge.capacity > 1  # so one signal does not fill the queue
         and edge.pipeline is None
         and event.worker.within is None
         and not event.worker.watched
@@ -218,11 +218,11 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
     queue = edge.queue
     carries = edge.active
 
-    # (parameters by keyword alone would cost 20 ns; who gives them by position is refused by the type checker)
+    # (keyword-only parameters would cost 20 ns; the type checker refuses positional ones)
     def emit(value: object = None, activity: int | None = None, stamp: float | None = None) -> None:
         if (
             activity is not None
-            or core.running_node is not worker  # not out of a fast path; perhaps a thread, while the loop is at work
+            or core.running_node is not worker  # not from a fast path; perhaps from a thread while the loop runs
             or watched
             or not edge.live
             or type(value) is Token

@@ -1,6 +1,6 @@
 """Chooses how a running node does its next piece of work, for its present shape.
 
-Asked whenever its wiring or somebody's interest in it has changed. Stands on `slots` and `firing`.
+It chooses again whenever the wiring or the observers of the node change. Depends on `slots` and `firing`.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ Step = Callable[[RunningNode], None]
 
 
 def specialise(worker: RunningNode) -> None:
-    """Give the worker the shortest step that is right for its present shape, behind its breakpoint if it has one."""
+    """Choose the shortest step that is right for the node's present shape; its breakpoint, if any, comes first."""
     region = worker.region
     if region is not None:
-        region.dissolve()  # which asks for each of its members, now or behind the call under way
+        region.dissolve()  # which calls this for each member, now or after the current call
         return
     step = _step_of(worker)
     worker.use_step(step if worker.halt is None else worker.halt(step))
 
 
 def _step_of(worker: RunningNode) -> Step:
-    if worker.within is not None:  # its border looks behind each step whether that was the last (G4)
+    if worker.within is not None:  # after each step, its border checks whether that was the last (G4)
         return iterating.step
     if worker.node is None and worker.process is not None:  # it takes what comes out, or lays down what comes in
         return worker.process
@@ -50,7 +50,7 @@ def _step_of(worker: RunningNode) -> Step:
 
 
 def _until_warm(worker: RunningNode, alone: Step) -> Step:
-    """What it does alone, until the node has fired so often that fusing pays; then a region behind it."""
+    """Return a step that runs `alone` until the node has fired so often that fusing pays, and forms a region then."""
     core = worker.core
     threaded = worker.group.threaded
     left = core.fuse_after // SOONER_IN_THREADS if threaded else core.fuse_after
@@ -80,7 +80,7 @@ def _until_warm(worker: RunningNode, alone: Step) -> Step:
 
 
 def _leave_lying(worker: RunningNode) -> None:
-    """A graph output: its token lies there until somebody reads it (P10)."""
+    """A graph output: its token lies there until it is read (P10)."""
     worker.dequeued()
 
 

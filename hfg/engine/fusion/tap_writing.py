@@ -1,8 +1,8 @@
-"""What the text of a wave says to those who look at edges inside of its region (rule R7).
+"""Lines of a wave's text that serve taps on edges inside its region (rule R7).
 
-Who must see each token at once is called with one. Who may be told later is told of all that has passed by one call,
-in the order in which it has: at the end of the wave, before code runs that may itself send something somebody looks at,
-and at a side exit. Stands on the model.
+A tap that must see each token immediately is called with it. A tap that may see tokens later gets all of them in one
+call, in their order: at the end of the wave, before code that may itself send on a tapped edge, and at a side exit.
+Depends on the model.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ _Say: TypeAlias = Callable[[str], None]
 
 
 class Passed(NamedTuple):
-    """A token that has passed from member to member, of which somebody is to be told.
+    """A token that has passed from member to member and still has to be shown to a tap.
 
     Attributes:
       k: the member that has sent it.
       number: of the edge among those of the member.
       output: of the member.
       edge: over which it has passed.
-      look: who is to be told; also if he looks no more by the time.
+      look: the tap; it gets the token even if it was removed meanwhile.
     """
 
     k: int
@@ -44,8 +44,8 @@ class TapWriter:
 
     Attributes:
       looks: who looks at the edges that lead from member to member; by member and edge, as in `Schedule.outs`.
-      batch: who is told of a wave together, in the order of their numbers in the text.
-      untold: what has passed before the call of each member, and nobody has been told.
+      batch: taps that get the tokens of a wave together, in the order of their numbers in the text.
+      untold: per member, the tokens that have passed before its call and that no tap has got.
     """
 
     def __init__(self, outs: Outs, say: _Say, *, real: bool) -> None:
@@ -61,11 +61,11 @@ class TapWriter:
         self.untold: dict[int, list[Passed]] = {}
 
     def anybody_behind(self, k: int) -> bool:
-        """Whether somebody looks at what member k or one behind it sends."""
+        """Whether a tap is on an edge of member k or of a later one."""
         return any(look is not None for look in itertools.chain(*self.looks[k:]))
 
     def bind(self) -> None:
-        """Who looks, and what they are told of, is found once."""
+        """Find the taps and their edges once."""
         say = self._say
         for number in range(len(self.batch)):
             say(f"batch{number} = names.batch[{number}]")
@@ -91,7 +91,7 @@ class TapWriter:
             self._say(f"look{k}_{number}(Token({value}, 0, stamp, e{k}_{number}.sent + region.waves + done + 1))")
 
     def emit(self) -> None:
-        """Who is not told yet is told now."""
+        """Show the taps the tokens that they have not got yet."""
         if not self._waiting:
             return
         self._say("nth = region.waves + done + 1")

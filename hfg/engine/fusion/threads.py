@@ -1,14 +1,14 @@
-"""Regions of a thread group: a whole wave is one job of the group's thread, one hand-over instead of one a hop.
+"""Regions of a thread group: a whole wave is one job of the group's thread, one hand-over instead of one per hop.
 
-The head's step, on the loop, takes the tokens; the thread calls the members one after the other, as `writing` has it,
-with values in locals; and back on the loop what has crossed the border is put, or the side exit is gone through. While
-the wave is under way all members are busy: whoever wants one of them waits until it is not, and makes the wave end
-behind its present call, so that nobody waits longer than for one firing.
+The head's step takes the tokens on the loop. The thread calls the members one after the other, as `writing` says, with
+values in locals. Back on the loop, the region puts the tokens that leave it, or takes the side exit. All members are
+busy during the wave. An edit that needs one of them ends the wave after its present call, so it waits for at most one
+firing.
 
-What crosses the border amid a wave leaves when its firing is over (F3), so that neighbours in other groups work at the
-same time; what the last member sends comes along with the wave.
+A token that leaves the region during a wave leaves when its firing is over (F3), so that neighbours in other groups run
+at the same time. The tokens of the last member come back with the wave.
 
-Stands on `region` and `writing`.
+Depends on `region` and `writing`.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _Sending = tuple[int, float, tuple[Any, ...]]
 
 
 class _Left(NamedTuple):
-    """A wave has ended behind the call of member k: what that gave back or raised, and all that the locals hold."""
+    """A wave has ended after the call of member k: its result or error, and the locals."""
 
     k: int | None
     found: dict[str, Any]
@@ -55,7 +55,7 @@ class _Left(NamedTuple):
 
 
 class _InThread:
-    """What the text of a wave turns to in the thread; the loop looks at it when the wave is back."""
+    """The methods that the text of a wave calls in the thread; the loop reads the outcome afterwards."""
 
     def __init__(self, region: ThreadRegion) -> None:
         self.order = region.order
@@ -74,7 +74,7 @@ class _InThread:
         self.sent.append((k, stamp, values))
 
     def over(self, done: int) -> int:
-        """So many waves have run to their end."""
+        """Waves have run to their end: `done` of them."""
         return done
 
     def leave(self, k: int, found: dict[str, Any]) -> _Left:
@@ -82,17 +82,17 @@ class _InThread:
         return _Left(k, found, found[f"r{k}"] if f"r{k}" in found else found[f"v{k}_0"])
 
     def caught(self, error: BaseException, found: dict[str, Any]) -> _Left:
-        """Which call has raised is told by its line."""
+        """A call has raised; the line says which one."""
         traceback: Any = error.__traceback__
         k = self._region.called_at(traceback.tb_frame.f_code, traceback.tb_lineno)
         return _Left(k, found, None, error)
 
 
 class ThreadRegion(Region):
-    """A head and those that fire behind it in one wave, in the thread of their group.
+    """A head and the nodes that fire after it in one wave, in the thread of their group.
 
     Attributes:
-      flags: not empty: the wave under way ends behind its present call; the thread looks at it.
+      flags: if not empty, the current wave ends after its present call; the thread checks it.
     """
 
     def __init__(self, schedule: Schedule, respecialise: Callable[[RunningNode], None]) -> None:
@@ -126,7 +126,7 @@ class ThreadRegion(Region):
             arguments[edge.position] = token.value
         stamp = self.core.now() if head.is_source else max(token.stamp for _, token in tokens)
         for worker in self.order:
-            worker.be_in_wave("firing")  # each may be the one whose call is under way: only the thread could tell
+            worker.be_in_wave("firing")  # each may be the one whose call is in progress: only the thread knows
         for worker in self._speaking:
             worker.send_as(stamp)
         for edge in self.entries:
@@ -163,7 +163,7 @@ class ThreadRegion(Region):
         return True
 
     def put_border(self, k: int, stamp: float, values: tuple[Any, ...]) -> None:
-        """What member k has sent over the border is on its way, if that is still there."""
+        """Put the tokens that member k has sent over the border on their edges, if those still exist."""
         core = self.core
         since = len(core.next_in_wave)
         for edge, value in zip(self._over_border[k], values, strict=True):
@@ -174,7 +174,7 @@ class ThreadRegion(Region):
             self.head.drop_firing()
 
     def _back(self, outcome: int | _Left, error: BaseException | None) -> None:
-        """The wave is over, or has ended behind one of its calls; on the loop."""
+        """The wave is over, or has ended after one of its calls; on the loop."""
         if error is not None:
             raise error  # a fault of ours
         self._rest()
@@ -190,7 +190,7 @@ class ThreadRegion(Region):
             self._waves_are_over(outcome)
 
     def _rest(self) -> bool:
-        """Nobody's code is under way any more; all but the head may be had."""
+        """No code is running any more; edits may have all members except the head."""
         for worker in self.order[1:]:
             worker.rest()
         for worker in self._speaking:
@@ -213,7 +213,7 @@ class ThreadRegion(Region):
             head.drop_firing()
             head.hold(self.held_entries)
         elif self.held_entries:
-            if not self.flags:  # those behind it free its outputs, and by that it lets go of what it took
+            if not self.flags:  # the later members free its outputs, which releases the tokens that it took
                 head.rest()
                 if head.fireable:
                     head.enqueue()
@@ -237,7 +237,7 @@ class ThreadRegion(Region):
                     idle_again(worker)
 
     def _exit(self, left: _Left) -> None:
-        """The firing under way ends as any other, and what is behind it goes the interpreted way."""
+        """The current firing ends like any other, and the later members fire one by one."""
         k, error, head = left.k, left.error, self.head
         if k is None:
             self.running = False
@@ -257,11 +257,11 @@ class ThreadRegion(Region):
     @override
     def materialise(self, k: int, found: dict[str, Any]) -> RunningNode:
         worker = super().materialise(k, found)
-        self.core.running_node = None  # nobody's code runs on the loop
+        self.core.running_node = None  # no node's code runs on the loop
         return worker
 
     def _too_late(self, outcome: int | _Left) -> None:
-        """The run is over: nobody hears of it, but it is counted."""
+        """The run is over: the wave is counted, and its results are ignored."""
         if not isinstance(outcome, _Left):
             self.running = False
             self.waves += outcome
@@ -276,12 +276,12 @@ class ThreadRegion(Region):
 
     @override
     def is_sending(self, worker: RunningNode) -> bool:
-        """What is sent amid a wave finds its worker busy; so this is none of it."""
+        """A member that sends during a wave is busy; this one is not, so no fused call of it is in progress."""
         return False
 
     @override
     def abandon(self) -> RunningNode:
-        """The wave under way does not come back: whose call it is in; those before it have fired."""
+        """The current wave does not come back. Return the member whose call it is in; those before it have fired."""
         group: Any = self.head.group
         frame = self._frame(sys._current_frames().get(group.thread_id()))  # noqa: SLF001 - as above: of frames
         k = self._wave.calls.get(frame.f_lineno, 0) if frame is not None else 0

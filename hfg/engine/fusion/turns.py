@@ -1,18 +1,18 @@
-"""What may come amid a wave without ending it: turns of outsiders, calls of members, activity that moves.
+"""Three things that may happen during a wave without ending it: turns of outsiders, calls of members, moving activity.
 
-The text of a wave is straight-line code for what happens in each wave. What happens seldom is a call of one of these
-methods, which do what the rules say about it and give back whether the wave goes on. Three things make that possible:
+The text of a wave is straight-line code for the ordinary case. For rare cases it calls one of these methods, which do
+what the rules say and return whether the wave continues. Three ideas make this possible:
 
 - **turns**: an outsider that a member enables stands in front of the run queue by R2, before the members that follow.
   So the wave puts a *turnstile* into the queue, the outsider before it, and works the queue off up to that. That is R2
   by the letter, and one odd node does not break a wave of sixty.
 - **calls**: a member with slots takes part in the run queue like any node. The wave sets its `queued` while its firing
-  is enabled and others have turns, so that calls which come then find their place behind it; and it looks whether calls
+  is enabled and others have turns, so that calls which come then have their turn after it; and it checks whether calls
   wait when it enables the firing, for those come first (F9).
 - **activity**: what carries +1 lies on its edge as a token, where subgraphs and A14 look for it; the local of the wave
   holds the value all the same.
 
-Stands on `wave_state`.
+Depends on `wave_state`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ __all__ = ["Turns"]
 
 
 class _Turnstile:
-    """Stands in the run queue behind those that have their turns amid a wave; nobody gets past it."""
+    """Stands in the run queue after the nodes that have their turns during a wave; no other node passes it."""
 
     calls = ()
 
@@ -69,7 +69,7 @@ class Turns(WaveState):
         """Let those move that stand before `until` in the run queue, and take that out; False: something came up."""
         group, core, flags, outputs = self.head.group, self.core, self.flags, self.head.outputs
         budget, ran_next = group.budget, core.ran_next
-        group.set_budget(1)  # a row of calls would run past the end
+        group.set_budget(1)  # or calls in a row would run past the turnstile
         outputs.expect()  # the head has fired, and its wave is not over: what has left the region does not free it
         goes_on = True
         while goes_on:
@@ -91,7 +91,7 @@ class Turns(WaveState):
     # --- calls of members -------------------------------------------------------------------------------------------
 
     def _enable(self, p: int) -> None:
-        """Member p is enabled: what calls it from now on has its place behind its firing, what waits before (F9)."""
+        """Member p is enabled: calls that wait go before its firing, calls that come from now on after it (F9)."""
         if self.order[p].calls:
             self.expect(p)
         else:
@@ -104,7 +104,7 @@ class Turns(WaveState):
         worker.run_next()
 
     def calls_first(self, p: int) -> bool:
-        """Calls wait at member p, and nobody of the wave goes before it any more; whether the wave is to stop there.
+        """Calls wait at member p, and it is the next member in the wave. Return whether the wave must stop there.
 
         All that stands before them in the run queue has its turn as well (R2).
         """
@@ -138,9 +138,9 @@ class Turns(WaveState):
         self.receive_at(k, tokens, stamp, doing)
 
     def receive_at(self, k: int, tokens: Sequence[Token[Any]], stamp: float, doing: str = "wave") -> None:
-        """The same for given tokens; from here on the node is amid its firing or call.
+        """The same for given tokens; from here on the node is busy.
 
-        Amid a wave, that is: whether code that was not known to send does so is still asked (`is_sending`).
+        Busy with a wave, so that `is_sending` still notices code that was not known to send.
         """
         worker = self.order[k]
         worker.be_in_wave(doing)
@@ -148,7 +148,7 @@ class Turns(WaveState):
         receive_modifiers(worker, [token.activity for token in tokens if token.activity])
 
     def send(self, k: int, values: Sequence[Any], stamp: float, done: int) -> bool:
-        """Member k sends, and activity leaves with that, or something is told behind it (A3, A5, A9).
+        """Member k sends, and activity leaves too, or automatic events follow (A3, A5, A9).
 
         Args:
           k: the member.

@@ -1,7 +1,7 @@
 """The fast path of async functions that really wait: started at once, and their value leaves when it is there.
 
-While such a node waits its wave waits too, so there is nothing to fuse; what can be spared is deciding everything anew
-at each firing. Only a shortening, as in `slots`: what it does not cover goes the interpreted way. Stands on `firing`.
+While such a node waits, its wave waits too, so there is nothing to fuse; this only avoids deciding everything again
+at each firing. Only a shortening, as in `slots`: everything else is left to `firing.step`. Depends on `firing`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""What a region knows between its waves: whether one may begin, what is counted, and who stands where in it.
+"""The state of a region between its waves: whether one may begin, the counts, and the turns of its members.
 
-Stands on `schedule`.
+Depends on `schedule`.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ class WaveState:
     Attributes:
       head: whose step runs a wave.
       schedule: the members in their order, and the edges between them.
-      takes_turns: outsiders have their turns amid a wave, so members may be alive; see `turns`.
-      waiting: outsiders that a sending of the wave under way has enabled, and that have not had their turns.
+      takes_turns: outsiders have their turns during a wave, so members may be active; see `turns`.
+      waiting: outsiders that a sending of the current wave has enabled, and that have not had their turns.
       armed: everything inside rests, or a wave runs.
-      running: a wave is under way.
-      called_off: the wave under way ends behind its present call, or behind the turn that somebody has in it.
-      flags: not empty: the wave under way ends behind its present call.
+      running: a wave is in progress.
+      called_off: the current wave ends after its present call, or after the present turn of an outsider.
+      flags: if not empty, the current wave ends after its present call.
       ending: some producer before the head sends END as soon as its outputs are free.
     """
 
@@ -59,7 +59,7 @@ class WaveState:
         self.ending = any(edge.source.pending_end for edge in self.held_entries)
         self.waves = 0  # not yet in the counts of members and edges
         self.silent = [0] * len(order)  # silent firings, likewise
-        self.spread = [0] * len(order)  # how often all behind a member were silent since it was
+        self.spread = [0] * len(order)  # how often a member silenced all later ones
         self._exits = [0] * len(order)
         self._formed_at = head.counts.firings
 
@@ -68,8 +68,8 @@ class WaveState:
     def arm(self) -> bool:
         """Before a wave that follows something unusual: does everything inside rest?
 
-        Where no outsider has a turn amid the wave nothing looks at activity there, so none may move. Where the answer
-        is no again and again, asking is put off.
+        Where outsiders have no turns during a wave, its text does not check activity, so none may move. After each
+        "no", the region waits longer before it checks again.
         """
         if self._put_off:
             self._put_off -= 1
@@ -87,7 +87,7 @@ class WaveState:
         return True
 
     def _rests(self, k: int) -> bool:
-        """Whether nothing is under way at a member, and nothing forbids its next firing or call.
+        """Whether a member has no firing or call in progress, and nothing forbids its next one.
 
         Nothing lies before it either, but for calls of one that fires as well: the wave looks at those where the firing
         has its place (F9).
@@ -124,7 +124,7 @@ class WaveState:
             raise EngineInternalError(f'node "{self.head.path}": its wave is over, but outsiders wait for turns in it')
 
     def disarm(self) -> None:
-        """The interpreted way goes on: write down what finished waves still wait for, where that way looks for it."""
+        """The members continue one by one: write into their barriers what finished waves still wait for."""
         if self.armed and not self.running:
             self.armed = False
             self.settle_counts()
@@ -147,12 +147,12 @@ class WaveState:
         self.ending = True
 
     def interrupt(self) -> None:
-        """The run is paused, or over: let the wave under way end behind its present call."""
+        """The run is paused, or over: end the current wave after its present call."""
         if self.running:
             self._call_off("interrupted")
 
     def _call_off(self, why: str) -> None:
-        """Let the wave under way end behind its present call."""
+        """End the current wave after its present call."""
         self.called_off = True
         self.flags.append(why)
 
@@ -180,7 +180,7 @@ class WaveState:
     # --- counts -----------------------------------------------------------------------------------------------------
 
     def settle_counts(self) -> None:
-        """Each member has fired once a wave, and each inner edge has carried one token."""
+        """Each member has fired once per wave, and each inner edge has carried one token."""
         waves, self.waves = self.waves, 0
         if waves:
             for edge in self.inner:

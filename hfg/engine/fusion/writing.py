@@ -1,16 +1,15 @@
-"""Writes the function that runs one wave of a region: straight-line Python, one line a call.
+"""Writes the function that runs one wave of a region: straight-line Python, one line per call.
 
 What is known when the region is formed is text; what depends on the region's objects comes in as closures, so that
 regions of one shape share their compiled code. A member's values are locals, `v3_0` for the first output of member 3;
-`None` is NO_MESSAGE. Behind each call stands one guard: the type of the result is that of the last one. Who raises a
-flag lets the wave forget these types, so the guard notices that, too (`Flags`). Everything else is a side exit of the
-region.
+`None` is NO_MESSAGE. After each call comes one guard: the result has the same type as the last one. A raised flag makes
+the wave forget these types, so the same guard notices flags (`Flags`). Everything else is a side exit of the region.
 
-What changes seldom is looked at where the rules look at it, by one attribute: whether a gate is open (`g3_0.active`),
-whether a member that could give its activity away has any (`w3.active`), whether calls wait (`c3`). If so, the region
-does the rest (see `turns`), and the wave goes on.
+Facts that rarely change are checked where the rules check them, by one attribute: whether a gate is open
+(`g3_0.active`), whether a member that could pass its activity on has any (`w3.active`), whether calls wait (`c3`). If
+so, the region does the rest (see `turns`), and the wave continues.
 
-Which call raised, and which one is under way, is told by the line. Stands on `firing_text`.
+The line says which call raised, and which one is in progress. Depends on `firing_text`.
 """
 
 from __future__ import annotations
@@ -125,7 +124,7 @@ class Writer(FiringText):
             say("until = core.until")
 
     def _odd(self) -> list[str]:
-        """What keeps the head's next piece of work from being a wave."""
+        """Return the conditions under which the head's next piece of work is not a wave."""
         odd = ["worker.busy", "not worker.fireable"]
         if self.fires_with_slots(0):
             odd.append("(c0 and worker.calls_before)")
@@ -148,7 +147,7 @@ class Writer(FiringText):
         return odd
 
     def _may_be_mute(self) -> bool:
-        """Whether a wave may begin without what the head misses: then all behind it see what that means to them."""
+        """Whether a wave may begin although values are missing at the head; each later member then sees the silence."""
         return self.turns and not self.is_source and all(type(edge) is SyncEdge for edge in self.entries)
 
     def _register(self) -> None:
@@ -205,7 +204,7 @@ class Writer(FiringText):
             say(f"inputs.missing += {synchronous}")
 
     def _end_of_wave(self) -> None:
-        """Is there another wave at once? Only if nobody else waits for the group: waves are first in, first out."""
+        """Start the next wave immediately, but only if no other node of the group waits: first in, first out (R2)."""
         say = self.say
         self.taps.emit()
         say("done += 1")

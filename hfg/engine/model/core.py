@@ -158,7 +158,7 @@ class Runtime(Protocol[NodeT]):
         """From a thread outside the run: make this call on the loop, in order, unless the run is over by then."""
 
     def adopt_event(self, port: EventPort[Any]) -> None:
-        """Give an event the run's scheduler and thread."""
+        """Attach the run's scheduler and thread to an event."""
 
 
 class Code(Protocol[NodeT]):

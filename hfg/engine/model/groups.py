@@ -85,7 +85,7 @@ class Group(Generic[NodeT]):
 
     @property
     def full(self) -> bool:
-        """Whether all its threads are at work, so that none of its nodes can move."""
+        """Whether all its threads are running, so that none of its nodes can move."""
         return False
 
     def charge(self, node: NodeT, busy_s: float) -> None:

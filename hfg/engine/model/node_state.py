@@ -213,7 +213,7 @@ class NodeState(Vertex[NodeT], Record):
         self.stamp = None
 
     def send_as(self, stamp: float | None) -> float | None:
-        """Give what it sends this stamp (T5). Return the previous one, of a call that is in progress."""
+        """Stamp its sendings with this (T5). Return the previous stamp, of a call that is in progress."""
         before, self.stamp = self.stamp, stamp
         return before
 

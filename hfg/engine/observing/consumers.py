@@ -2,7 +2,7 @@
 
 A plain function is called with each event as it happens, on the loop: it loses nothing and its time is the graph's.
 One that is slow goes behind a buffer, a plain one on a thread of its own, an async one in a task: it loses its own
-oldest events, counted, and the graph does not wait. Stands on `trace`.
+oldest events, counted, and the graph does not wait. Depends on `trace`.
 """
 
 from __future__ import annotations

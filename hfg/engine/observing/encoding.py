@@ -2,7 +2,7 @@
 
 A token that holds a marker has "marker" in place of "value", so that the end of a stream and the text "END" are two
 things: `{"marker": "END", ...}` and `{"value": "END", ...}`. What JSON does not know is written as text, an array by
-its shape. Stands on msgspec; knows tokens, no verbs.
+its shape. Depends on msgspec; knows tokens, no verbs.
 """
 
 from __future__ import annotations

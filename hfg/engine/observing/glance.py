@@ -1,7 +1,7 @@
 """A glance at a run: the few counts that a live table shows, cheap enough to take many times a second.
 
 `Statistics` says more and costs ten times as much. Everything that grows is a count since the run began, so whoever
-looks twice knows rates and shares. Stands on `measuring`.
+looks twice knows rates and shares. Depends on `measuring`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
       failed: failed firings and calls so far.
       active: A(v).
       doing: "working", or what it waits for (`NodeStatistics.waiting`).
-      under_way: how many of its firings are under way now.
+      under_way: how many of its firings are in progress now.
       retries: how often a firing was tried again so far.
       age_s: how long ago its counts were taken, on the run's clock: a node of another process is as of its last report.
       fused: whether its firings are part of a region's waves (`Run.explain`).

@@ -1,7 +1,7 @@
 """What measures the code of running nodes: it wraps the code, and the rest of the engine does not know.
 
 Of a node that is very fast only some firings between two looks are measured and stand for the others, so that measuring
-costs next to nothing; all are counted. Stands on `running_node` and `stepping`.
+costs next to nothing; all are counted. Depends on `running_node` and `stepping`.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ class Meter:
         self._wrapped: set[str] = set()
 
     def measure(self) -> None:
-        """From now on the node's code is measured; its step is to be chosen anew."""
+        """From now on the node's code is measured; its step is to be chosen again."""
         worker = self.worker
         worker.be_measured(self)
         if worker.iteration is None and worker.process is not None:

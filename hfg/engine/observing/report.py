@@ -1,4 +1,4 @@
-"""What a run has done, in numbers: frozen structs for people, tests and `--json`. Stands on `running_node`."""
+"""What a run has done, in numbers: frozen structs for people, tests and `--json`. Depends on `running_node`."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class NodeReport(msgspec.Struct, frozen=True):
       failed: failed firings and calls.
       retries: how often a firing was tried again (X1).
       restarts: how often X1 restarted it.
-      most_under_way: how many of its firings were under way at once, at most (F14).
+      most_under_way: how many of its firings were in progress at once, at most (F14).
       active: A(v).
       ended: whether it has sent END.
     """
@@ -143,7 +143,7 @@ class RunPage(Protocol):
         """Why the file could not be written in the end; None if all is well."""
 
     def text(self) -> str:
-        """Give the page as far as the run has come."""
+        """Return the page as far as the run has come."""
 
     def write(self) -> None:
         """Write the file now, as far as the run has come; the end of the run does it again."""

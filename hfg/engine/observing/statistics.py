@@ -36,19 +36,19 @@ class NodeStatistics(NodeReport, frozen=True, kw_only=True):
 
     Attributes:
       group: where it runs.
-      under_way: how many of its firings are under way now; with concurrency those too that wait for their turn.
+      under_way: how many of its firings are in progress now; with concurrency those too that wait for their turn.
       rate_hz: firings and calls a second of the run's clock, over the last one to two seconds.
       busy: how long its firings and calls took on the machine's clock, what async code waited for included.
       busy_share: of the machine's time since measuring began, how much its code kept its group busy.
       latency: from the stamp of what it took to the end of its firing or call, on the run's clock; sources have none.
       doing: "working", or what it waits for now (see `waiting`).
-      waiting: seconds of the run's clock by what it waited for: "turn" (others of its group are at work), "input x"
+      waiting: seconds of the run's clock by what it waited for: "turn" (others of its group are running), "input x"
         (a token there), "output x" (its token there is not processed yet), "rate", "queue" (one of its events' is
         full), "recorder" (without loss, of its ports), "gate", "ready", "restart", "signal" (it has slots only),
-        "do" (its do-activity is under way), "start", "unconnected", "disabled", "ended".
+        "do" (its do-activity is in progress), "start", "unconnected", "disabled", "ended".
       active_share: of the time since measuring began, how much it was active.
       queued: untaken tokens in front of it.
-      tasks: what its code has started by `start_soon` and is under way, by name.
+      tasks: what its code has started by `start_soon` and is in progress, by name.
     """
 
     group: str

@@ -1,7 +1,7 @@
 """Taps: looking at what passes a port or an edge while the graph runs.
 
 A tap keeps the newest tokens in a buffer of its own. The graph never waits for it; what it is too slow for is skipped
-and counted. Only the node in front of what is tapped leaves its shortest way. Stands on `ports` and `relays`.
+and counted. Only the node in front of what is tapped leaves its shortest way. Depends on `ports` and `relays`.
 """
 
 from __future__ import annotations
@@ -206,7 +206,7 @@ class Taps:
         return tap
 
     def look(self, what: Any, looker: Looker) -> Callable[[], None]:
-        """Let somebody look at a port or an edge from now on; gives back what ends that.
+        """Attach a tap to a port or an edge. Return the function that detaches it.
 
         Raises:
           UsageError: nothing passes there.

@@ -2,7 +2,7 @@
 
 And reset (A14).
 
-Only workers marked `watched` come here. Stands on `sending`.
+Only workers marked `watched` come here. Depends on `sending`.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ def rest(worker: RunningNode) -> None:
 
 
 def scopes_changed(core: Core) -> None:
-    """G2: derive A(subgraph) anew for all that were touched, then tell it.
+    """G2: derive A(subgraph) again for all that were touched, then tell it.
 
     Inner ones first, the last of those side by side.
     """
@@ -150,7 +150,7 @@ def _index(scope: Scope) -> float:
 
 
 def deactivate_inside(scope: Scope, cause: Literal["sent", "slot"]) -> None:
-    """Take all activity from the inside: of nodes, and of tokens under way."""
+    """Take all activity from the inside: of nodes, and of tokens in transit."""
     if not scope.watched:
         scope.find_inner_edges()
     assert scope.worker is not None

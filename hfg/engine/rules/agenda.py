@@ -1,6 +1,7 @@
 """Who may move: places in the agenda, run queues, and what keeps a node from firing (rules F1, F8, F9, F11).
 
-Plain functions over the run's state; they queue workers and never run a node's code. Stands on `running_node`, `edges`.
+Plain functions over the run's state; they queue nodes and never run a node's code. Depends on `running_node` and
+`edges`.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ __all__ = [
 
 
 def make_fireable(worker: RunningNode) -> bool:
-    """Give the next firing its place if all that a firing needs holds now (F1, F9); it is still to be queued."""
+    """Enable the next firing if all that it needs holds now (F1, F9); the node must still be queued."""
     if worker.blocked or worker.fireable or worker.inputs.missing or worker.outputs.missing:
         return False
     if worker.paced and must_wait(worker):

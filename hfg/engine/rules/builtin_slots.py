@@ -2,7 +2,7 @@
 
 And the graph's own: stop, abort (A10).
 
-Stands on `node_lifecycle` and `modifiers`.
+Depends on `node_lifecycle` and `modifiers`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Slot calls (rules F6, F9, A6, P8). Stands on `releasing`; a node's code is run by the host."""
+"""Slot calls (rules F6, F9, A6, P8). Depends on `releasing`; a node's code is run by the host."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def finish_call(worker: RunningNode, outcome: CallOutcome) -> None:
 
 
 def set_parameter(worker: RunningNode, name: str, value: object) -> None:
-    """Give a parameter a value that came by a token.
+    """Set a parameter to the value of a token.
 
     Raises:
       ValueError: it is out of its limits, or what the value itself raises: an error of the firing or call (X1).

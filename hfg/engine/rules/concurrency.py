@@ -1,8 +1,8 @@
-"""Several firings of one node under way at once: how they go on, leave and end (rule F14).
+"""Several firings of one node in progress at once: how they go on, leave and end (rule F14).
 
 A firing takes its tokens as any other (`firing.fire`) and is then a *concurrent firing*. When its code is over, what it
 sends waits until the outputs are free and, where they are ordered, all that began earlier have left. Until then it
-counts among those under way, which is the back-pressure of such a node. Stands on `errors`, `ending` and `retries`.
+counts among those in progress, which is the back-pressure of such a node. Depends on `errors`, `ending` and `retries`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def _flights(worker: RunningNode) -> ConcurrentFirings:
 def begin(
     worker: RunningNode, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
 ) -> None:
-    """A firing has taken its tokens: it goes on beside those that are under way.
+    """A firing has taken its tokens: it goes on beside those that are in progress.
 
     Args:
       worker: whose firing.
@@ -52,7 +52,7 @@ def begin(
     concurrent = _flights(worker)
     stamp = worker.stamp
     assert stamp is not None
-    if kind == "end":  # behind all that are under way (F14)
+    if kind == "end":  # behind all that are in progress (F14)
         drop_taken(worker, edges, tokens)
         concurrent.end(ConcurrentFiring(worker, worker.counts.firings, stamp))
         worker.limit_concurrency()
@@ -278,7 +278,7 @@ def _announce(firing: ConcurrentFiring, written: list[Any] | None) -> None:
 
 
 def _tell(worker: RunningNode, name: str, value: Any) -> None:
-    """A9: an automatic event of this firing; those of a call that is under way follow that."""
+    """A9: an automatic event of this firing; those of a call that is in progress follow that."""
     event = worker.events.get(name)
     if event is not None:
         trigger(event, value, stamp=None if type(value) is Token else worker.core.now(), extend_right=False)
@@ -294,7 +294,7 @@ def _tell_end(firing: ConcurrentFiring, outcome: Any) -> None:
 
 
 def _end(worker: RunningNode) -> None:
-    """F4: all others have left, so the node ends; a slot call may be under way meanwhile."""
+    """F4: all others have left, so the node ends; a slot call may be in progress meanwhile."""
     concurrent, core = _flights(worker), worker.core
     if concurrent:
         return
@@ -330,7 +330,7 @@ def _ended(firing: ConcurrentFiring, result: Any, error: BaseException | None) -
 
 
 def _send_end(worker: RunningNode) -> None:
-    """F4: END leaves as soon as the outputs are free, a slot call under way or not."""
+    """F4: END leaves as soon as the outputs are free, a slot call in progress or not."""
     if worker.outputs.missing and not worker.blocked & DISABLED:
         return
     before = worker.stamp

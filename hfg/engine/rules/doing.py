@@ -1,7 +1,7 @@
 """The do-activity of a node: one coroutine that begins with its activity and is cancelled with it (rule A15).
 
 It is a task of the node; `model.tasks.Doing` says whether it is due, and this module when it begins and what follows
-its end. Nodes whose type has no `do` never come here. Stands on `sending`.
+its end. Nodes whose type has no `do` never come here. Depends on `sending`.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def _is_current(task: Task) -> bool:
 
 
 def afresh(worker: RunningNode) -> None:
-    """The node has been set up anew: if it is active its do-activity begins anew too."""
+    """The node has been set up again: if it is active its do-activity begins again too."""
     if has(worker):
         _of(worker).be_due(worker.active)
         go_on(worker)
@@ -78,7 +78,7 @@ def begun(worker: RunningNode) -> None:
 
 
 def over(worker: RunningNode, task: Task, result: object, error: BaseException | None) -> BaseException | None:
-    """It has ended: say so, and with what it returned if it came to its end by itself; gives back how it failed."""
+    """It has ended: report it, with its result if it ended by itself. Return its error."""
     core = worker.core
     worker.need_tasks().doing.over()
     worker.node._outdated = None

@@ -1,6 +1,6 @@
 """The end of a node: its `end()`, what it writes there, END behind it (rules F2, F4, F12).
 
-Stands on `releasing`; a node's code is run by the host.
+Depends on `releasing`; a node's code is run by the host.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def ends_itself(worker: RunningNode, error: BaseException | None) -> bool:
 
 
 def end_itself(worker: RunningNode) -> None:
-    """F2: end amid a firing of its own; what that has written before leaves with what `end()` writes (F4)."""
+    """F2: end during a firing of its own; what that has written before leaves with what `end()` writes (F4)."""
     worker.execution.close_generator()  # nothing is left to close
     end(worker, (), ())
 
@@ -114,7 +114,7 @@ def _ended(worker: RunningNode, result: object, error: BaseException | None) -> 
     stamp = worker.stamp
     worker.leave()  # the firing is over; END is not part of it (A3)
     assert worker.ending is not None
-    if worker.ending.is_dead_source:  # amid a firing, and that is over now: nobody is left who would hear END (R5)
+    if worker.ending.is_dead_source:  # during a firing, and that is over now: nobody is left who would hear END (R5)
         worker.ending.take_deferred()
     elif worker.outputs.missing and not worker.blocked & DISABLED:
         worker.promise_end(stamp)

@@ -1,6 +1,6 @@
 """What becomes of a failure in a node's code: stop, skip, disable or restart (rules X1, X2).
 
-Stands on `sending`; the firing and calling modules bring failures here.
+Depends on `sending`; the firing and calling modules bring failures here.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def fail(
 
 
 def fail_beside(worker: RunningNode, what: str, error: BaseException) -> None:
-    """A task of the node has failed, perhaps amid a firing, which goes on; the node's policy decides (X1)."""
+    """A task of the node has failed, perhaps during a firing, which goes on; the node's policy decides (X1)."""
     if isinstance(error, QueueLimit):
         worker.core.runtime.finish("failed", error)
         return
@@ -112,7 +112,7 @@ def fail_beside(worker: RunningNode, what: str, error: BaseException) -> None:
         return
     automatic(worker, "failed", Failure(problem, {}))
     restarts = begin_over(worker, policy)
-    if worker.busy in BETWEEN_FIRINGS:  # else it follows the firing or call under way (A9)
+    if worker.busy in BETWEEN_FIRINGS:  # else it follows the firing or call in progress (A9)
         send_automatic(worker)
     follow(worker, policy, restarts=restarts)
 

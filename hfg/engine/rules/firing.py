@@ -1,6 +1,6 @@
 """What a node does next: a firing (rules F1-F4, F9, F11, P6, P8, A6, A11, T5).
 
-The interpreted way; the wing `fusion` shortens it for plain shapes, and falls back to it. Stands on `ending` and
+The interpreted way; the wing `fusion` shortens it for plain shapes, and falls back to it. Depends on `ending` and
 `calls`; a node's code is run by the host.
 """
 
@@ -350,7 +350,7 @@ def _run_process(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Tok
 
 
 def _open(worker: RunningNode, step: Callable[[Any], object]) -> object:
-    """Begin a source that is a generator, or a function that gives back an iterator, and take its first value."""
+    """Begin a source that is a generator, or a function that returns an iterator, and take its first value."""
     iterator = worker.process()  # type: ignore[misc]  # a source has one
     method = "__next__" if step is next else "__anext__"
     if not hasattr(iterator, method):

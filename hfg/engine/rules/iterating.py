@@ -1,6 +1,6 @@
 """When the border of a subgraph that iterates lets the next element in (rule G4).
 
-Outside it is one node that fires; its firing is over when the last element has gone to quiet inside. Stands on
+Outside it is one node that fires; its firing is over when the last element has gone to quiet inside. Depends on
 `firing` and `quiet`.
 """
 

@@ -3,7 +3,7 @@
 A letter to a hundred states concerns the one that is active. The sender keeps those that may listen: whoever becomes
 active, or gets a token with activity into a slot, is noted; whoever does not listen any more is found at the next
 sending. What the others would have got is counted for all together, and for each when somebody asks. While somebody
-looks at the tokens themselves (trace, tap) each edge is gone through instead. Stands on the model.
+looks at the tokens themselves (trace, tap) each edge is gone through instead. Depends on the model.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def may_listen(worker: RunningNode) -> None:
 
 
 def find_listeners(worker: RunningNode) -> None:
-    """Derive anew which edges of each output lead to slots that listen only while their nodes are active."""
+    """Derive again which edges of each output lead to slots that listen only while their nodes are active."""
     for old in worker.listeners:
         if old is not None:
             old.let_go()
@@ -74,7 +74,7 @@ class Listeners:
             target.listened.append((self, edge))
 
     def who_hear(self) -> tuple[Any, ...] | list[Any]:
-        """Give the edges on which a token is to be put now, in order; the others have got theirs by that."""
+        """Return the edges on which a token is to be put now, in order; the others have got theirs by that."""
         if self._core.trace is not None:
             self.settle_counts()
             return self._edges

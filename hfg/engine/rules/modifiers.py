@@ -1,6 +1,6 @@
 """What activity does to a node, and what is lost or given back (rules A5-A8, F10).
 
-Stands on `agenda`; what follows from a change is decided further up.
+Depends on `agenda`; what follows from a change is decided further up.
 """
 
 from __future__ import annotations
@@ -69,16 +69,16 @@ def touch(core: Core, scopes: Sequence[Scope]) -> None:
 
 
 def derive_scopes(core: Core) -> None:
-    """After a step that may have moved activity: derive A(subgraph) anew where it is watched (G2).
+    """After a step that may have moved activity: derive A(subgraph) again where it is watched (G2).
 
-    Amid a change of several edges that is left to its end.
+    During a change of several edges that is left to its end.
     """
     if core.dirty_scopes and core.deferred_events is None:
         core.rules.scopes_changed(core)
 
 
 def automatic(worker: RunningNode, name: str, value: object = None) -> None:
-    """An automatic event has arisen; it leaves after the firing or call under way, or at the next flush."""
+    """An automatic event has arisen; it leaves after the firing or call in progress, or at the next flush."""
     if name in worker.events:
         worker.expect_event(name, value)
 

@@ -1,6 +1,6 @@
 """Beginning, ending, disabling and enabling single nodes (rules F10, A9 reset, X1 restart).
 
-Each setup is followed by a teardown before the next one, whatever happens to a node meanwhile. Stands on `sending` and
+Each setup is followed by a teardown before the next one, whatever happens to a node meanwhile. Depends on `sending` and
 `wiring`; hooks are run by the host, one after another.
 """
 
@@ -48,7 +48,7 @@ def nothing() -> None:
 def when_idle(
     worker: RunningNode, action: Callable[[RunningNode, Callable[[], None]], None], then: Callable[[], None]
 ) -> None:
-    """Do it when the node's firing or call under way is over, and let none begin meanwhile (F9, F10)."""
+    """Do it when the node's firing or call in progress is over, and let none begin meanwhile (F9, F10)."""
 
     def begin() -> None:
         worker.be_busy("setup")
@@ -105,7 +105,7 @@ def _run_teardown(worker: RunningNode, then: Then) -> None:
 
 
 def set_up(worker: RunningNode, then: Then) -> None:
-    """Give the node fresh state and run its `setup()`; `then(error)` follows."""
+    """Make new state for the node and run its `setup()`; `then(error)` follows."""
     if worker.node is None:
         then(None)
         return
@@ -245,7 +245,7 @@ def _empty(worker: RunningNode, untaken: Collection[Edge]) -> None:
     outgoing = [edge for edges in worker.wired_out for edge in edges]
     for edge in (*incoming, *outgoing):
         discard(edge, "disabled")
-    # a firing under way is finished, but producers do not wait for it; what consumers have taken they finish
+    # a firing in progress is finished, but producers do not wait for it; what consumers have taken they finish
     worker.release_early()
     release([edge for edge in incoming if type(edge) is not EventEdge])
     for edge in (edge for edge in outgoing if edge in untaken):
@@ -263,7 +263,7 @@ def discard_initial(edges: Iterable[Any]) -> None:
 
 
 def enable(worker: RunningNode, then: Callable[[], None], *, fresh: bool = False) -> None:
-    """F10: the node starts afresh, unless it is `fresh` already; A(v) is kept.
+    """F10: the node starts from scratch, unless it is `fresh` already; A(v) is kept.
 
     In the back-off of a restart that sets it up, when it is over.
     """

@@ -1,6 +1,6 @@
 """What happens when nothing moves: events end, the run ends or has stalled (rules F13, P9, R5).
 
-Decides only; `run` asks when it sees that no code runs, no worker is queued and no timer is pending. Stands on
+Decides only; `run` asks when it sees that no code runs, no worker is queued and no timer is pending. Depends on
 `ending` and `sources`.
 """
 
@@ -138,7 +138,7 @@ def only_dead_sources_in_flight(core: Core, *, threads_too: bool) -> bool:
 
 
 def only_waiting_for_room(core: Core) -> bool:
-    """F8: all code under way waits until a full queue has room, which nothing brings now, so it keeps nobody up."""
+    """F8: all code in progress waits until a full queue has room, which nothing brings now, so it keeps nobody up."""
     return sum(worker.codes_waiting_for_room() for worker in core.workers) >= core.in_flight + core.tasks
 
 
@@ -175,7 +175,7 @@ def stalled(reasons: Sequence[str]) -> Stalled:
 
 
 def unread(core: Core, read: Collection[RunningNode]) -> list[RunningNode]:
-    """Give the graph outputs that nobody reads and that hold somebody back who could move (P10).
+    """Return the graph outputs that nobody reads and that hold somebody back who could move (P10).
 
     Args:
       core: the run, which is quiet.

@@ -1,6 +1,6 @@
 """When what was sent counts as processed, and who goes on by that (rules F5, P7, P10).
 
-Stands on `sending`.
+Depends on `sending`.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def make_room(edge: AnyEdge) -> None:
 
 
 def outputs_free(worker: RunningNode) -> Sequence[Any]:
-    """All its tokens are processed: it may go on; gives back the edges that are released by that (F5 sequential)."""
+    """All its tokens are processed: it may continue. Return the edges that this releases (F5 sequential)."""
     released = worker.outputs_free()
     if worker.outputs.waiters is not None:
         worker.outputs.notify()

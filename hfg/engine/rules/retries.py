@@ -1,7 +1,7 @@
 """Firings that fail are tried again with the same values before the node's policy decides (rule X1).
 
 A signal that an attempt has sent cannot be taken back, so such a firing is not repeated; what an attempt has written to
-outputs has not left, and is thrown away. Each attempt has the time limit of a firing. Stands on `firing`.
+outputs has not left, and is thrown away. Each attempt has the time limit of a firing. Depends on `firing`.
 """
 
 from __future__ import annotations

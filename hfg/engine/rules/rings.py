@@ -1,14 +1,14 @@
 """Rings of nodes that wait for each other and that only full queues close: artificial deadlocks (rule F8).
 
 A node that stands still waits for what others do. From a node that a full queue holds back we follow these waits. What
-is left when all that may still happen is taken away is stuck for good, whatever else runs; a ring of it that leads
+is left when all that may still happen is taken away is stuck permanently, whatever else runs; a ring of it that leads
 through a full queue ends by one more place in that queue. This is the local deadlock of Geilen and Basten (2003),
 found as a greatest fixed point.
 
 A walk begins only at nodes that a full queue has come to hold back, or whose last walk ended at code or a timer that is
 over now (`Core.suspects`); at all that are held back after an edit, and when a node can fire no more or again
 (`Core.waits_changed`). So a graph without full queues pays nothing, and of many nodes that are held back only those
-are looked at again for which something has changed. Stands on `agenda`.
+are looked at again for which something has changed. Depends on `agenda`.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _FIRE: Final = "fire"  # begins its next firing
 _CALL: Final = "call"  # begins its next slot call
 _TELL: Final = "tell"  # triggers an event
 _RING: Final = "ring"  # the same, by a timer
-_FINISH: Final = "finish"  # ends the firing or call under way, and with it what follows (F5)
+_FINISH: Final = "finish"  # ends the firing or call in progress, and with it what follows (F5)
 _ROOM: Final = "room"  # has room in each queue behind its events
 _HEAR: Final = "hear"  # gets a token for one of its slots
 
@@ -93,7 +93,7 @@ def resolve(core: Core) -> bool:
 
 
 def _take_suspects(core: Core) -> list[RunningNode]:
-    """Give all that may have come to be in a ring; each is looked at once."""
+    """Return all that may have come to be in a ring; each is looked at once."""
     if not core.full_edges:
         suspects: Iterable[RunningNode] = ()
     else:
@@ -150,7 +150,7 @@ _SMALL: Final = 64  # signals that no queue is reported for
 
 
 def _report_overgrown(core: Core, edge: EventEdge, declared: int) -> None:
-    """Log and report a queue that may grow for ever; once for all queues of a ring."""
+    """Log and report a queue that may grow forever; once for all queues of a ring."""
     ring = _ring_of(core, edge)
     is_reported = any(one.source in ring and one.target in ring for one in core.overgrown)
     core.overgrown.append(edge)
@@ -203,7 +203,7 @@ class _Walk:
     # --- rings ------------------------------------------------------------------------------------------------------
 
     def smallest_of_rings(self, held: Iterable[RunningNode]) -> list[EventEdge]:
-        """Give of each ring its full queue with the smallest capacity; a ring that waits for another comes later."""
+        """Return for each ring its full queue with the smallest capacity; a ring that waits for another comes later."""
         self._follow([(worker, _ROOM) for worker in held])
         self._open()
         stuck = [action for action in self._waits if action not in self._opened]
@@ -277,7 +277,7 @@ class _Walk:
         return again
 
     def _reasons(self, held: RunningNode) -> Iterator[Action]:
-        """Give what may happen by itself, and who else is held back and has reasons of its own."""
+        """Return what may happen by itself, and who else is held back and has reasons of its own."""
         begin: Action = (held, _ROOM)
         if begin not in self._opened:
             yield begin
@@ -448,7 +448,7 @@ def _full_edges(worker: RunningNode) -> list[EventEdge]:
 
 
 def _works(worker: RunningNode) -> bool:
-    """Whether a firing or call is under way that does not only wait for room."""
+    """Whether a firing or call is in progress that does not only wait for room."""
     if worker.concurrent is None:
         return worker.busy not in BETWEEN_FIRINGS and not worker.room.waiting  # an edit that holds it changes no wait
     unfinished = sum(not started.outcome for started in worker.concurrent)
@@ -477,7 +477,7 @@ def is_held(worker: RunningNode) -> bool:
 
 
 def _goes_on(worker: RunningNode, what: str) -> bool:
-    """Whether code of it is under way, or the timer of a rate that alone delays this, which say so when over."""
+    """Whether code of it is in progress, or the timer of a rate that alone delays this, which say so when over."""
     if worker.execution.in_flight or (what == _FIRE and worker.blocked & RATE):
         return True
     return worker.concurrent is not None and worker.concurrent.working > 0

@@ -1,6 +1,6 @@
 """What leaves a node: one token per output edge, signals, END, automatic events (rules T, P4-P7, F3, F8, A3-A5, A9).
 
-A sending is on all its edges before anything comes of it. Stands on `modifiers`.
+A sending is on all its edges before anything comes of it. Depends on `modifiers`.
 """
 
 from __future__ import annotations
@@ -247,7 +247,7 @@ def sent(core: Core) -> None:
     if core.dirty_scopes:
         derive_scopes(core)
     for target, _ in drained:
-        if target.busy in BETWEEN_FIRINGS:  # else it follows the firing or call under way
+        if target.busy in BETWEEN_FIRINGS:  # else it follows the firing or call in progress
             emit_automatic(target)
 
 
@@ -306,7 +306,7 @@ def trigger(
     worker = event.worker
     core = worker.core
     if core.over:
-        return  # code that was under way at the end speaks to nobody
+        return  # code that was in progress at the end speaks to nobody
     value, explicit, stamp = unwrapped(value, explicit, stamp)
     if stamp is None:
         stamp = core.now() if worker.stamp is None else worker.stamp
@@ -332,7 +332,7 @@ def trigger_from_task(
 ) -> None:
     """A task of the node sends a signal: a sending of its own, with the present as its stamp (T5, A3, A9).
 
-    If it takes the activity of the node, a firing or call that is under way has no right to that by A3.
+    If it takes the activity of the node, a firing or call that is in progress has no right to that by A3.
     """
     worker = event.worker
     right = worker.may_carry

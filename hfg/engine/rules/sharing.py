@@ -1,6 +1,6 @@
 """What becomes of it when a value that is shared is changed (rule T1); in debug mode, which `core.sharing` tells.
 
-Stands on `running_node`.
+Depends on `running_node`.
 """
 
 from __future__ import annotations

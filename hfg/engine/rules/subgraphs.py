@@ -2,7 +2,7 @@
 
 (rules F10, G2).
 
-Stands on `node_lifecycle` and `activity`.
+Depends on `node_lifecycle` and `activity`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def run_slot(scope: Scope, name: str, then: Callable[[], None]) -> None:
 
 
 def _each(workers: Iterable[RunningNode], action: Action, then: Callable[[], None]) -> None:
-    """Do it to those at rest, one after the other in order of adding; who is amid a firing or call follows after it.
+    """Do it to those at rest, one after the other in order of adding; a node in a firing or call follows after it.
 
     Without recursion, for there may be thousands.
     """

@@ -1,6 +1,6 @@
 """What the code of tasks sends, which is beside the firings of their node (rules F3, T5, A3).
 
-Installed on a node's ports when its code has started one by `start_soon`; others pay nothing. Stands on `sending`.
+Installed on a node's ports when its code has started one by `start_soon`; others pay nothing. Depends on `sending`.
 """
 
 from __future__ import annotations

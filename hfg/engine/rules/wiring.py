@@ -1,6 +1,6 @@
 """Which edges are live, and what that makes of a worker (SEMANTICS "live edge", rules F1, F5, F10, G1).
 
-Called when the plan is made and when something is enabled, disabled, ended or edited; never per token. Stands on
+Called when the plan is made and when something is enabled, disabled, ended or edited; never per token. Depends on
 `worker`.
 """
 
@@ -29,7 +29,7 @@ def reaches(edge: Edge) -> bool:
 
 
 def refresh(worker: RunningNode) -> None:
-    """Derive anew what is live around a worker: it and its neighbours."""
+    """Derive again what is live around a worker: it and its neighbours."""
     touched = {worker.index: worker}
     for edge in worker.edges_in():
         edge.enliven(is_live(edge))
@@ -58,7 +58,7 @@ def refresh_via(scope: Scope) -> None:
 
 
 def rewire(worker: RunningNode) -> None:
-    """Derive what a worker waits for and sends on from the liveness of its edges; its step is chosen anew."""
+    """Derive what a worker waits for and sends on from the liveness of its edges; its step is chosen again."""
     worker.rewire(tuple(edge for edge in worker.in_edges if _is_waited_for(edge)))
     find_listeners(worker)
     if worker.is_boundary_output or _may_fire(worker):

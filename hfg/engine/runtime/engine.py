@@ -459,7 +459,7 @@ class Engine:
             )
 
     def adopt_event(self, port: EventPort[Any]) -> None:
-        """Give an event the run's scheduler and thread (P9)."""
+        """Attach the run's scheduler and thread to an event (P9)."""
         port._scheduler = self.scheduler
         port._thread = self._thread
 

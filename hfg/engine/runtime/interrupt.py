@@ -7,7 +7,7 @@
        after 1.8 s: so does whatever still keeps us ────────────────────────────────┘
     second Ctrl-C: what runs gets a KeyboardInterrupt, nothing is waited for
 
-Somebody who handles SIGINT already is not disturbed. The command line has its own, which leaves the process. Stands on
+Somebody who handles SIGINT already is not disturbed. The command line has its own, which leaves the process. Depends on
 asyncio and signals.
 """
 

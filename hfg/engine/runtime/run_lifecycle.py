@@ -1,6 +1,6 @@
 """The beginning and the end of a run: nodes are set up in order and torn down in reverse order (rules A10, R5, X3).
 
-Stands on `node_lifecycle`, `engine` and `code`.
+Depends on `node_lifecycle`, `engine` and `code`.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ class RunLifecycle:
             consider(worker)
 
     def carry(self, worker: RunningNode) -> None:
-        """Give an async node its dormant task."""
+        """Create the dormant task of an async node."""
         if worker.may_wait():
             worker.execution.run_in(self._engine.code.eager_task(worker))
 
@@ -164,7 +164,7 @@ class RunLifecycle:
         self._disposables[edge] = rx.pipe_edge(edge, operators, self._engine)
 
     def came(self, worker: RunningNode) -> None:
-        """A node was set up while the run was under way (R4)."""
+        """A node was set up while the run was in progress (R4)."""
         self._was_set_up[worker] = None
 
     def forget(self, one: Any) -> None:

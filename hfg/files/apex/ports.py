@@ -1,7 +1,7 @@
 """Which port of a node is meant by a name in a file: by number, with or without the automatic ports, or a parameter's.
 
 In CS::APEX every node has the events activated, deactivated and processed, and the slots enable and disable; triggers
-among its parameters follow, then what it declares. Older files leave them out. Stands on
+among its parameters follow, then what it declares. Older files leave them out. Depends on
 `table`.
 """
 

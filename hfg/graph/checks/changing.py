@@ -1,6 +1,6 @@
 """Node types whose code changes what it takes (rule T1): read from the source of their process functions.
 
-What is bound anew in the function may be a copy and is left alone. Depends on `flat`.
+What is bound again in the function may be a copy and is left alone. Depends on `flat`.
 """
 
 from __future__ import annotations

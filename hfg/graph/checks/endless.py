@@ -37,7 +37,7 @@ _HARMLESS_CODE: Final = (
 
 
 def endless(flat: FlatGraph, *, virtual: bool = False) -> Iterator[FlatNode]:
-    """Yield the sources that hold the run at one instant for ever.
+    """Yield the sources that hold the run at one instant forever.
 
     Args:
       flat: where they are.

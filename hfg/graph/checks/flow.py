@@ -1,4 +1,4 @@
-"""Checks of what flows: who waits for ever, what goes round, what never comes (rules F1, F2, F8, P7, A9).
+"""Checks of what flows: who waits forever, what goes round, what never comes (rules F1, F2, F8, P7, A9).
 
 Depends on `flat` and `order`.
 """
@@ -183,7 +183,7 @@ def _needs_firing(edge: FlatEdge) -> bool:
 
 
 def filling_rings(flat: FlatGraph) -> Iterator[Problem]:
-    """Rings of signals in which each signal comes back more than once, so that queues may grow for ever (rule F8)."""
+    """Rings of signals in which each signal comes back more than once, so that queues may grow forever (rule F8)."""
     bounded = ("drop_oldest", "drop_newest", "latest", "error")
     lossless = [
         edge
@@ -359,7 +359,7 @@ def _slots(names: list[str]) -> str:
 
 
 def endless_sources(flat: FlatGraph) -> Iterator[Problem]:
-    """Sources that keep the loop busy for ever; only those of which it is certain (rule F2)."""
+    """Sources that keep the loop busy forever; only those of which it is certain (rule F2)."""
     for node in endless(flat):
         yield Problem(
             path=node.path,

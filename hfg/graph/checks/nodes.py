@@ -258,7 +258,7 @@ def _names_in(code: CodeType) -> Iterator[str]:
 
 
 def concurrent_firings(flat: FlatGraph) -> Iterator[Problem]:
-    """Nodes with several firings under way at once that cannot have them (rule F14)."""
+    """Nodes with several firings in progress at once that cannot have them (rule F14)."""
     concurrent = [node for node in flat.nodes if node.options.concurrency > 1]
     for node in concurrent:
         count, group = node.options.concurrency, flat.groups.get(node.options.group or "loop")

@@ -294,7 +294,7 @@ def _within(way: Sequence[Point]) -> list[Point]:
 
 
 def _on_line(line: Line) -> Iterator[str]:
-    """Draw what stands on a line or at its end: the number of a bundle, what is said, a tag."""
+    """Draw labels on a line or at its end: the number of a bundle, what is said, a tag."""
     if line.count_at is not None:
         x, y = line.count_at
         yield f'<rect class="hfg-pill" x="{_n(x - 9)}" y="{_n(y - 8)}" width="18" height="16" rx="8"/>'

@@ -2,7 +2,7 @@
 
 A change holds the nodes and edges themselves, with their places in the order, so that undoing restores the same objects
 at the same places: a run recognises them by identity, and keeps the tokens on them. A change was checked before it is
-made, so it cannot fail half-way. A run reads the changes, too, to see which edges are gone for good.
+made, so it cannot fail half-way. A run reads the changes, too, to see which edges are gone permanently.
 """
 
 from __future__ import annotations

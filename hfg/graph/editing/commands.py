@@ -164,7 +164,7 @@ class Copy(Command, frozen=True):
 
 
 class Rename(Command, frozen=True):
-    """Give a node another name; the paths of all inside follow."""
+    """Rename a node; the paths of all nodes inside follow."""
 
     path: str
     name: str

@@ -1,6 +1,6 @@
 """Grouping nodes into a subgraph and dissolving one, so that nobody else can tell (rule G1).
 
-Each edge over the border gets a port of its own, in order, so that what a node sends keeps its order. Stands on
+Each edge over the border gets a port of its own, in order, so that what a node sends keeps its order. Depends on
 `changes`, `queue_conflicts` and levels.
 """
 

@@ -87,7 +87,7 @@ def kept(old: Node, command: Replace) -> dict[str, Any]:
 
 
 def _as_now(spec: ParameterSpec, value: object) -> object:
-    """Convert a value of a class that a reload has made anew, an enum or a dataclass, to the new class."""
+    """Convert a value of a class that a reload has made again, an enum or a dataclass, to the new class."""
     if spec.check(value) is None:
         return value
     try:

@@ -56,7 +56,7 @@ def replace(steps: Steps, old: Node, new: Node) -> list[tuple[Level, Edge]]:
 
 
 def _replace_box(steps: Steps, around: Level, old: Node, new: Node, edges: list[Edge]) -> None:
-    """Remove a node and add the other: the inner graph of a subgraph is built anew, so its nodes are others."""
+    """Remove a node and add the other: the inner graph of a subgraph is built again, so its nodes are others."""
     name, options = old.place.name, old._options
     position = around.members.position(name)
     spots = [around.connections.position(edge) for edge in edges_of(around, old)]

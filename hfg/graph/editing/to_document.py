@@ -339,7 +339,7 @@ def _kind(node: Node) -> object:
 
 
 def _said(edge: Edge) -> EdgeGiven[Any, Any]:
-    """Return the options of an edge; operators without a name are made anew each time and count as equal."""
+    """Return the options of an edge; operators without a name are made again each time and count as equal."""
     said = edge.options.said()
     if "through" in said:
         said["through"] = [one if isinstance(one, NamedOperator) else None for one in said["through"]]

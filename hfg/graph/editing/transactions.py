@@ -1,6 +1,6 @@
 """Transactions of commands, and the history of a graph: what was edited can be undone and redone exactly (rule R4).
 
-There is one history for each graph, whether it runs or not: a run goes the same steps in between. Stands on
+There is one history for each graph, whether it runs or not: a run goes the same steps in between. Depends on
 `performing` and `checks`.
 """
 

@@ -34,7 +34,7 @@ class CutEdge(msgspec.Struct, frozen=True, eq=False):
       edge: as it is in the whole graph.
       source, target: the parts of its ends.
       guarantee: "exact" for whatever may lose nothing, "bounded" for signals with a policy that drops.
-      window: the most tokens that may be under way, for what may lose nothing.
+      window: the most tokens that may be in progress, for what may lose nothing.
       hint: the declared type of what it carries.
       within_host: whether both ends are on one host.
       number: among those of the cutting, by their labels: it stays the same as long as they do.

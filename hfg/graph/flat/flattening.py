@@ -48,7 +48,7 @@ def _collect_nodes(flat: FlatGraph, prefix: str, group: str) -> list[tuple[Level
     """Fill nodes and scopes; give the levels they were found in, depth first, and how many scopes lie around each."""
     nodes, scopes = flat.nodes, flat.scopes
     levels = [(flat.level, 0)]
-    # One entry for each graph that is under way: what is left of it, and what holds for its nodes.
+    # One entry for each graph that is in progress: what is left of it, and what holds for its nodes.
     stack: list[tuple[Iterator[tuple[str, Node]], str, tuple[int, ...], str]] = [
         (iter(flat.level.nodes.items()), prefix, (), group)
     ]

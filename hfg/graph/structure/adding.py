@@ -154,7 +154,7 @@ def need_fitting(node: Node, path: str, options: NodeOptions) -> None:
 
 
 def _need_separate_firings(node: Node, said: str, options: NodeOptions) -> None:
-    """F14: several firings may be under way at once."""
+    """F14: several firings may be in progress at once."""
     kind = node._type
     _need_firings_of_its_own(node, said)
     if kind.process_kind in ("generator", "async generator"):

@@ -96,7 +96,7 @@ def owner_of(end: SourceEnd) -> object:
 def is_single(target: TargetEnd) -> bool:
     """Return whether at most one edge may lead into it (rule P2): inputs and parameters.
 
-    A subgraph's output seen from inside is a relay, at which streams may converge on their way into a slot (rule G1);
+    A subgraph's output seen from inside is a relay, at which streams may converge before a slot (rule G1);
     that no input gets two edges so is seen by the check. What iterates makes one list of each output (rule G4).
     """
     return target.kind in ("input", "parameter") or (target.kind == "output" and bool(iterated(target.node)))

@@ -133,7 +133,7 @@ class Link(msgspec.Struct, eq=False):
 
 
 class Work(msgspec.Struct, eq=False):
-    """A level on its way to a layout."""
+    """A level while it is laid out."""
 
     things: list[Thing]
     links: list[Link]
