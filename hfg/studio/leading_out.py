@@ -1,4 +1,4 @@
-"""Leads a port inside a subgraph out of it: the subgraph gets a port of its own, with an edge to a port of its neighbours.
+"""Leads a port inside a subgraph out of it: the subgraph gets its own port, with an edge to a port of its neighbours.
 
 A subgraph without a type of its own has the ports that its edges need (rule G1), so it is dissolved, connected and
 enclosed again, in one edit: nodes, tokens and activity stay as they are. Depends on `targets`.
