@@ -42,7 +42,7 @@ def changed(worker: RunningNode, active: bool) -> None:
 
 
 def _call_hooks(worker: RunningNode, active: bool) -> None:
-    """What its code is told; the do-activity begins behind `on_activated` (A15)."""
+    """Call the node's hooks; the do-activity begins after `on_activated` (A15)."""
     if not doing.has(worker):
         _call_hook(worker, "on_activated" if active else "on_deactivated", None)
     elif active:
@@ -85,7 +85,7 @@ def _time_out(worker: RunningNode) -> None:
     if event is None:
         return
     trigger(event, stamp=worker.core.now(), extend_right=False)
-    worker.let_carry(False)  # behind the sending, which may have given it (A3)
+    worker.let_carry(False)  # after the sending, which may have given it (A3)
     scopes_changed(worker.core)
     if worker.busy in BETWEEN_FIRINGS:  # else after the firing (A9)
         send_automatic(worker)

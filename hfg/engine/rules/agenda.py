@@ -1,4 +1,4 @@
-"""Who may move: places in the agenda, run queues, and what keeps a node from firing (rules F1, F8, F9, F11).
+"""Which nodes may move: places in the agenda, run queues, and blocks that keep a node from firing (F1, F8, F9, F11).
 
 Plain functions over the run's state; they queue nodes and never run a node's code. Depends on `running_node` and
 `edges`.

@@ -87,7 +87,7 @@ def _run_handler(worker: RunningNode, name: str, token: Token[Any]) -> None:
     handler = worker.handlers.get(name)
     if handler is None:
         builtin_slots.run(worker, name, token, lambda: finish_call(worker, "done"))
-        derive_scopes(core)  # behind what `activate` does (A7)
+        derive_scopes(core)  # after the effects of `activate` (A7)
         return
     derive_scopes(core)
     ticket = worker.ticket

@@ -40,7 +40,7 @@ def _flights(worker: RunningNode) -> ConcurrentFirings:
 def begin(
     worker: RunningNode, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
 ) -> None:
-    """A firing has taken its tokens: it goes on beside those that are in progress.
+    """A firing has taken its tokens: it continues alongside those in progress.
 
     Args:
       worker: whose firing.
@@ -52,7 +52,7 @@ def begin(
     concurrent = _flights(worker)
     stamp = worker.stamp
     assert stamp is not None
-    if kind == "end":  # behind all that are in progress (F14)
+    if kind == "end":  # after all that are in progress (F14)
         drop_taken(worker, edges, tokens)
         concurrent.end(ConcurrentFiring(worker, worker.counts.firings, stamp))
         worker.limit_concurrency()
@@ -78,7 +78,7 @@ def begin(
 
 
 def _note_process(worker: RunningNode) -> None:
-    """What a firing whose function is to run means to the next one."""
+    """Prepare the next firing, after one whose function is about to run."""
     firings.note_start(worker)
     if not worker.inputs.missing:  # what the next firing asks for holds already: before the calls that come now (F9)
         consider(worker)
@@ -210,7 +210,7 @@ def complete_firings(worker: RunningNode) -> None:
     """Let those that are over leave whose turn it is; the end comes last."""
     concurrent = _flights(worker)
     if concurrent.leaving:
-        return  # what it sends is processed at once: it goes on below
+        return  # its tokens are processed immediately: it continues below
     _let_leave(worker)
     if worker.core.over:
         return
@@ -261,7 +261,7 @@ def _leave(firing: ConcurrentFiring) -> None:
         return
     assert worker.ending is not None
     if worker.ending.is_dead_source:
-        worker.ending.take_deferred()  # nobody is left who would hear END (R5)
+        worker.ending.take_deferred()  # no consumer of END is left (R5)
     else:
         worker.promise_end(firing.stamp)
 

@@ -1,4 +1,4 @@
-"""The end of a node: its `end()`, what it writes there, END behind it (rules F2, F4, F12).
+"""The end of a node: its `end()`, the values written there, and END after them (rules F2, F4, F12).
 
 Depends on `releasing`; a node's code is run by the host.
 """
@@ -23,14 +23,14 @@ __all__ = ["drain_left", "drop_taken", "end", "end_itself", "ends_itself", "gave
 
 
 def ends_itself(worker: RunningNode, error: BaseException | None) -> bool:
-    """F2: what the process function has raised is no error, but says that the node has ended."""
+    """F2: the process function has raised `EndOfStream`, which is not an error: the node has ended."""
     return isinstance(error, EndOfStream) or (
         worker.is_source and isinstance(error, StopIteration | StopAsyncIteration)  # its generator has returned
     )
 
 
 def end_itself(worker: RunningNode) -> None:
-    """F2: end during a firing of its own; what that has written before leaves with what `end()` writes (F4)."""
+    """F2: end during a firing of its own; its values leave together with those of `end()` (F4)."""
     worker.execution.close_generator()  # nothing is left to close
     end(worker, (), ())
 
@@ -57,7 +57,7 @@ def end(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]])
 
 
 def drop_taken(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
-    """F4(1): values that the ending firing has taken are for nobody."""
+    """F4(1): values that the ending firing has taken are dropped."""
     core = worker.core
     for edge, token in zip(edges, tokens, strict=True):
         if type(token.value) is not Marker:
@@ -102,7 +102,7 @@ def _ended(worker: RunningNode, result: object, error: BaseException | None) -> 
         error = gave_back(result)
     if error is not None:
         written = None
-        then = partial(send_automatic, worker)  # that it has failed is told before it may be disabled
+        then = partial(send_automatic, worker)  # it triggers `failed` before it may be disabled
         worker.core.rules.fail(worker, "end()", error, answer=False, then=then)
     if written is not None and any(entry is not None for entry in written):
         put_outputs(worker, written)
@@ -114,7 +114,7 @@ def _ended(worker: RunningNode, result: object, error: BaseException | None) -> 
     stamp = worker.stamp
     worker.leave()  # the firing is over; END is not part of it (A3)
     assert worker.ending is not None
-    if worker.ending.is_dead_source:  # during a firing, and that is over now: nobody is left who would hear END (R5)
+    if worker.ending.is_dead_source:  # during a firing, which is over now: no consumer of END is left (R5)
         worker.ending.take_deferred()
     elif worker.outputs.missing and not worker.blocked & DISABLED:
         worker.promise_end(stamp)

@@ -90,7 +90,7 @@ def _wrong_value(worker: RunningNode, error: Exception) -> str:
 def fail(
     worker: RunningNode, what: str, error: BaseException, *, answer: bool, then: Callable[[], None] | None = None
 ) -> None:
-    """A firing (`answer`: it still owes its outputs) or something beside one has failed; see `apply_policy`."""
+    """A firing (`answer`: it still owes its outputs) or other code of the node has failed; see `apply_policy`."""
     if isinstance(error, QueueLimit):
         worker.core.runtime.finish("failed", error)
         return
@@ -101,7 +101,7 @@ def fail(
 
 
 def fail_beside(worker: RunningNode, what: str, error: BaseException) -> None:
-    """A task of the node has failed, perhaps during a firing, which goes on; the node's policy decides (X1)."""
+    """A task of the node has failed, perhaps during a firing, which continues; the node's policy decides (X1)."""
     if isinstance(error, QueueLimit):
         worker.core.runtime.finish("failed", error)
         return

@@ -144,7 +144,7 @@ def fire(worker: RunningNode, *, ends: bool = False) -> None:
 
 
 def _note(worker: RunningNode, kind: FiringKind) -> None:
-    """What a firing of that kind means to the next one."""
+    """Prepare the next firing, after one of that kind."""
     if kind == "process":
         note_start(worker)
     if kind != "end":
@@ -197,7 +197,7 @@ def _fire_plainly(worker: RunningNode) -> None:
 
 
 def _call_at_once(worker: RunningNode, values: list[Any]) -> None:
-    """Run a plain function on the loop: what `execute` does where nothing waits and nobody can give the firing up."""
+    """Run a plain function on the loop: `execute` for a firing that does not wait and cannot be given up."""
     core = worker.core
     core.current = worker
     try:
@@ -211,7 +211,7 @@ def _call_at_once(worker: RunningNode, values: list[Any]) -> None:
 
 
 def _free_places(worker: RunningNode, edges: Sequence[Any]) -> None:
-    """What has been taken gives room on edges where that is enough (F5 pipelined, F6)."""
+    """Release the tokens taken from edges that wait for no more than that (F5 pipelined, F6)."""
     for edge in edges:
         make_room(edge)
         if not edge.live and not edge.untaken:  # the last that a source sent that is disabled by now (F10)
@@ -321,7 +321,7 @@ def arguments_of(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Tok
 
 
 def values_of(edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> dict[str, Any]:
-    """What was taken, value by name of the input."""
+    """Return the values that were taken, by the name of the input."""
     return {
         edge.port_name: token.value
         for edge, token in zip(edges, tokens, strict=True)
@@ -413,7 +413,7 @@ def merge(
 
     Args:
       worker: whose firing is over.
-      result: what its function has given back.
+      result: the result of its function.
       written: what it has sent, by output.
       parameters: what the node's were in this firing; by default as they are now.
     """

@@ -24,7 +24,7 @@ def begin(worker: RunningNode, arguments: Sequence[Any]) -> None:
     assert iteration is not None
     try:
         iteration.begin(dict(zip(worker.type.inputs, arguments, strict=True)), worker.options.iterate_over)
-    except Exception as error:  # what is no collection raises what it likes
+    except Exception as error:  # a value that is not a collection may raise anything
         worker.core.rules.fail(worker, f"firing {worker.counts.firings}", error, answer=True)
         return
     worker.core.iterating.append(iteration)
@@ -68,7 +68,7 @@ def _settle(iteration: Iteration) -> bool:
 
 
 def _go_on(iteration: Iteration) -> None:
-    """Let the next element in; behind the last one the firing is over.
+    """Let the next element in; after the last one, the firing is over.
 
     An edge of the border holds one token, as any synchronous one does (P4): an element before which the last one lies
     untaken, where nothing moves any more, is an error of the firing (X1).
@@ -105,7 +105,7 @@ def _fail(iteration: Iteration, occupied: Sequence[Any]) -> None:
 
 
 def _collect(reader: RunningNode) -> None:
-    """What lies at an output of the inside comes out."""
+    """A token at an output of the inside comes out."""
     reader.dequeued()
     iteration = reader.within
     assert iteration is not None

@@ -15,7 +15,7 @@ from hfg.ports.edges import Edge, SyncEdge
 
 __all__ = ["Listeners", "find_listeners", "listens", "may_listen"]
 
-_FEW = 4  # so many edges are faster gone through
+_FEW = 4  # up to this many edges, a loop is faster
 
 
 def listens(worker: RunningNode) -> bool:
@@ -74,7 +74,7 @@ class Listeners:
             target.listened.append((self, edge))
 
     def who_hear(self) -> tuple[Any, ...] | list[Any]:
-        """Return the edges on which a token is to be put now, in order; the others have got theirs by that."""
+        """Return the edges on which a token must be put now, in order; for the others it is only counted."""
         if self._core.trace is not None:
             self.settle_counts()
             return self._edges
@@ -102,7 +102,7 @@ class Listeners:
                 self._seen[edge] = count
 
     def let_go(self) -> None:
-        """Nobody tells them any more."""
+        """They are not told of changes any more."""
         self.settle_counts()
         del self._core.listeners[self]
         for edge in self._quiet:

@@ -1,4 +1,4 @@
-"""What activity does to a node, and what is lost or given back (rules A5-A8, F10).
+"""How activity changes a node, and how it is lost or returned (rules A5-A8, F10).
 
 Depends on `agenda`; what follows from a change is decided further up.
 """
@@ -55,7 +55,7 @@ def set_active(worker: RunningNode, active: bool, cause: ActivityCause) -> None:
 
 
 def tell_activity(worker: RunningNode, cause: ActivityCause) -> None:
-    """It has become active, or is no longer: tell who listens, if somebody does (R7)."""
+    """It has become active or inactive: report it to the consumers of the trace, if there are any (R7)."""
     core = worker.core
     if core.trace_changes is not None:
         core.trace_changes(ActivityChanged(core.now(), worker.path, worker.active, cause))
@@ -71,7 +71,7 @@ def touch(core: Core, scopes: Sequence[Scope]) -> None:
 def derive_scopes(core: Core) -> None:
     """After a step that may have moved activity: derive A(subgraph) again where it is watched (G2).
 
-    During a change of several edges that is left to its end.
+    While several edges change, this waits for the end of the change.
     """
     if core.dirty_scopes and core.deferred_events is None:
         core.rules.scopes_changed(core)
@@ -84,7 +84,7 @@ def automatic(worker: RunningNode, name: str, value: object = None) -> None:
 
 
 def discard(edge: AnyEdge, reason: DropReason) -> None:
-    """Take everything from an edge, counted and with its activity given back (F10, A8)."""
+    """Take all tokens from an edge, count them and return their activity (F10, A8)."""
     tokens = edge.clear()
     target: RunningNode = edge.target
     if not tokens:
@@ -129,7 +129,7 @@ def give_back(edge: Edge) -> None:
 
 
 def lose(edge: Edge) -> None:
-    """Nobody can have the activity that came over the edge."""
+    """No node can have the activity that came over the edge: count it as lost."""
     core: Core = edge.target.core
     core.lost_activity += 1
     if core.trace_changes is not None:

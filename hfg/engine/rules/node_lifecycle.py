@@ -42,7 +42,7 @@ Then = Callable[[NodeError | None], None]
 
 
 def nothing() -> None:
-    """What follows when nobody waits for it."""
+    """A callback that does nothing."""
 
 
 def when_idle(
@@ -156,7 +156,7 @@ def tear_down(worker: RunningNode, then: Then) -> None:
     if worker.concurrent is not None and worker.has_concurrent_code() and not worker.core.over:
         worker.concurrent.when_rested(
             lambda: tear_down(worker, then)
-        )  # its firings go on beside a call of `reset` (F14)
+        )  # its firings continue during a call of `reset` (F14)
         return
     tasks = worker.tasks
     if tasks is not None and tasks.end(lambda: tear_down(worker, then)):
@@ -203,7 +203,7 @@ def disable_around(workers: Iterable[RunningNode]) -> None:
 
 
 def end_tasks(workers: Iterable[RunningNode]) -> None:
-    """F10: what the code of disabled nodes has started beside their firings has no end by itself, so it is cancelled.
+    """F10: tasks that the code of disabled nodes has started do not end by themselves, so they are cancelled.
 
     It lasts longer than the `setup()` of nodes that are disabled from the start, or reset while they are.
     """
@@ -223,7 +223,7 @@ def _settle_disabled(workers: Sequence[RunningNode]) -> None:
     if not workers:
         return
     untaken = {edge for worker in workers for edges in worker.wired_out for edge in edges if edge.untaken}
-    for worker in workers:  # first: activity that is given back may trigger, but not over edges that are dead now
+    for worker in workers:  # first: returned activity may trigger, but not over edges that are dead now
         wiring.refresh(worker)
     with deferring_events(workers[0].core):
         for worker in workers:
@@ -232,7 +232,7 @@ def _settle_disabled(workers: Sequence[RunningNode]) -> None:
             if worker.concurrent is not None:
                 worker.core.rules.complete_firings(
                     worker
-                )  # what is over goes to nobody, so it need not wait for its turn (F14)
+                )  # finished firings send to no one, so they need not wait for their turn (F14)
         for worker in workers:  # what consumers have taken is on edges that are dead, and holds no END (F5)
             if worker.pending_end and worker.busy in BETWEEN_FIRINGS:
                 send_end(worker)
@@ -256,7 +256,7 @@ def _empty(worker: RunningNode, untaken: Collection[Edge]) -> None:
 
 
 def discard_initial(edges: Iterable[Any]) -> None:
-    """F10 for who is disabled from the start: what lies on its edges is what disabling it now would discard."""
+    """F10 for a node that is disabled from the start: discard the tokens that disabling it now would discard."""
     for edge in edges:
         if edge.target.blocked & DISABLED or (edge.source.blocked & DISABLED and type(edge) is BufferEdge):
             discard(edge, "disabled")
@@ -280,7 +280,7 @@ def enable(worker: RunningNode, then: Callable[[], None], *, fresh: bool = False
             return
         worker.allow(DISABLED | ENDED)
         _not_ended(worker)
-        if itself and core.trace_changes is not None:  # else the subgraph around it was, and that is told
+        if itself and core.trace_changes is not None:  # else the subgraph around it was, and that is reported
             core.trace_changes(NodeEnabled(core.now(), worker.path, True))
         wiring.refresh(worker)
         take_part(worker)

@@ -48,7 +48,7 @@ __all__ = [
 
 
 def complete_operators(core: Core) -> bool:
-    """P9: before the run ends each event with operators completes, so that they give out what they hold."""
+    """P9: before the run ends, each event with operators completes, so that they release the values they hold."""
     edges = [edge for edge in core.edges if type(edge) is EventEdge and edge.complete is not None]
     came_out = [complete_edge(edge) for edge in edges]  # each of them, not only up to the first
     return any(came_out)
@@ -67,7 +67,7 @@ def complete_edge(edge: EventEdge) -> bool:
 def end_events(core: Core) -> bool:
     """F13: all live event edges into inputs whose queue is empty get END, at the same moment and once.
 
-    Graph inputs that nobody feeds likewise; not what is inside of what iterates, where nobody ever ends (G4).
+    Likewise graph inputs that are not fed; not the nodes inside an iteration, where none ever ends (G4).
     """
     edges = [
         edge
@@ -94,7 +94,7 @@ def end_events(core: Core) -> bool:
 
 
 def node_ended(worker: RunningNode) -> None:
-    """A node is over: its operators complete (P9), and sources may feed nobody any more (R5)."""
+    """A node is over: its operators complete (P9), and sources may have no consumer left (R5)."""
     for edge in worker.event_edges():
         complete_edge(edge)
     if any(edge.source.is_source for edge in worker.in_edges):
@@ -138,7 +138,7 @@ def only_dead_sources_in_flight(core: Core, *, threads_too: bool) -> bool:
 
 
 def only_waiting_for_room(core: Core) -> bool:
-    """F8: all code in progress waits until a full queue has room, which nothing brings now, so it keeps nobody up."""
+    """F8: all code in progress waits for room in full queues, and no node can make room, so the run may end."""
     return sum(worker.codes_waiting_for_room() for worker in core.workers) >= core.in_flight + core.tasks
 
 
@@ -175,7 +175,7 @@ def stalled(reasons: Sequence[str]) -> Stalled:
 
 
 def unread(core: Core, read: Collection[RunningNode]) -> list[RunningNode]:
-    """Return the graph outputs that nobody reads and that hold somebody back who could move (P10).
+    """Return the graph outputs that are not read and that hold back a node that could move (P10).
 
     Args:
       core: the run, which is quiet.

@@ -1,4 +1,4 @@
-"""When what was sent counts as processed, and who goes on by that (rules F5, P7, P10).
+"""When a sent token counts as processed, and which nodes continue then (rules F5, P7, P10).
 
 Depends on `sending`.
 """
@@ -25,7 +25,7 @@ def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
 
     Args:
       edges: where they lay.
-      drained: those of the edges whose tokens nobody has taken, which was told already (F12).
+      drained: the edges whose tokens were drained, which was reported already (F12).
     """
     stack: list[Any] = list(reversed(edges))
     while stack:

@@ -1,14 +1,14 @@
 """Rings of nodes that wait for each other and that only full queues close: artificial deadlocks (rule F8).
 
 A node that stands still waits for what others do. From a node that a full queue holds back we follow these waits. What
-is left when all that may still happen is taken away is stuck permanently, whatever else runs; a ring of it that leads
+is left when all that may still happen is taken away is stuck permanently, whatever else runs. A ring of it that leads
 through a full queue ends by one more place in that queue. This is the local deadlock of Geilen and Basten (2003),
 found as a greatest fixed point.
 
-A walk begins only at nodes that a full queue has come to hold back, or whose last walk ended at code or a timer that is
-over now (`Core.suspects`); at all that are held back after an edit, and when a node can fire no more or again
-(`Core.waits_changed`). So a graph without full queues pays nothing, and of many nodes that are held back only those
-are looked at again for which something has changed. Depends on `agenda`.
+A walk begins at nodes that a full queue has just come to hold back, or whose last walk ended at code or a timer that is
+over now (`Core.suspects`). After an edit, and when a node can fire no more or again (`Core.waits_changed`), it begins
+at all nodes that are held back. So a graph without full queues pays nothing, and of many nodes that are held back only
+those are checked again for which something has changed. Depends on `agenda`.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _CALL: Final = "call"  # begins its next slot call
 _TELL: Final = "tell"  # triggers an event
 _RING: Final = "ring"  # the same, by a timer
 _FINISH: Final = "finish"  # ends the firing or call in progress, and with it what follows (F5)
-_ROOM: Final = "room"  # has room in each queue behind its events
+_ROOM: Final = "room"  # has room in each queue that its events fill
 _HEAR: Final = "hear"  # gets a token for one of its slots
 
 _ELSEWHERE: Final[Action] = (None, "elsewhere")
@@ -74,7 +74,7 @@ _NEVER = _Wait([], any_of=True)
 def resolve(core: Core) -> bool:
     """Let each ring that has closed grow, as long as there are any; whether there were."""
     grew = False
-    again: list[RunningNode] = []  # nobody tells when what keeps these out of rings changes
+    again: list[RunningNode] = []  # they are not told when the reason that keeps them out of rings changes
     while not core.over and (suspects := _take_suspects(core)):
         known: dict[RunningNode, bool] = {}
         again += [worker for worker in suspects if _plainly_goes_on(worker, known)]
@@ -123,7 +123,7 @@ def smallest_at_rest(core: Core) -> EventEdge | None:
 
 
 def grow_queue(core: Core, edge: EventEdge) -> None:
-    """F8: this queue gets one more place, or the run fails, for it may not grow."""
+    """F8: this queue gets one more place, or the run fails because it may not grow."""
     if edge.capacity_limit is not None and edge.capacity >= edge.capacity_limit:
         core.runtime.finish(
             "failed",
@@ -191,7 +191,7 @@ def _ring_of(core: Core, edge: EventEdge) -> list[RunningNode]:
 
 
 class _Walk:
-    """What waits for what, as far as it was followed from some nodes that full queues hold back."""
+    """The waits, followed from some nodes that full queues hold back."""
 
     def __init__(self, core: Core, *, at_rest: bool = False) -> None:
         self._core = core
@@ -212,7 +212,7 @@ class _Walk:
         part_of: dict[int, int] = {}
         before: set[int] = set()  # parts that are a ring, or wait for one
         found: list[EventEdge] = []
-        for name, part in enumerate(strongly_connected(leads_to)):  # behind those that they lead to
+        for name, part in enumerate(strongly_connected(leads_to)):  # after those that they lead to
             part_of.update(dict.fromkeys(part, name))
             if any(part_of[other] in before for number in part for other in leads_to[number]):
                 before.add(name)
@@ -249,7 +249,7 @@ class _Walk:
                 self._may[action] = wait
 
     def _open(self) -> None:
-        """Take away what may happen, and what only waits for that."""
+        """Take away the actions that may happen, and those that only wait for them."""
         asked_by: dict[Action, list[Action]] = {}
         missing: dict[Action, int] = {}
         for action, wait in self._waits.items():
@@ -267,7 +267,10 @@ class _Walk:
                     waiting.append(other)
 
     def watch(self, held: Iterable[RunningNode]) -> list[RunningNode]:
-        """Have these looked at again when what keeps them out of rings has changed; give those whom nobody tells."""
+        """Have these checked again when the reason that keeps them out of rings changes.
+
+        Return those that no one tells.
+        """
         again = []
         for worker in held:
             if not all([self._will_tell(reason, worker) for reason in self._reasons(worker)]):  # noqa: C419 - each
@@ -310,7 +313,7 @@ class _Walk:
     # --- what each action waits for ---------------------------------------------------------------------------------
 
     def _look(self, action: Action) -> _Wait | RunningNode | None:
-        """Say what an action waits for, or whose doing it is that it may happen by itself; None: nobody tells of it."""
+        """Return what an action waits for, or the node that may do it by itself; None if no one reports its end."""
         worker, what = action
         if worker is None:
             return self._elsewhere()
@@ -320,7 +323,7 @@ class _Walk:
             full = _full_edges(worker)
             return _Wait([_taking(edge) for edge in full]) if full else worker
         if worker.region is not None:
-            worker.region.disarm()  # while it is armed its head alone says that something is not processed
+            worker.region.disarm()  # while it is armed, only its head says that a token is not processed
         if worker.node is None and worker.scope is None and not (worker is self._core.boundary and what == _CALL):
             return self._at_border(worker)
         if what == _FIRE:
@@ -332,16 +335,16 @@ class _Walk:
         return _finish(worker) if what == _FINISH else _hear(worker)
 
     def _at_border(self, worker: RunningNode) -> _Wait | RunningNode:
-        """What stands for the graph's own ports, for other parts of it, or for the border of what iterates."""
+        """Nodes that stand for the graph's own ports, for other parts of it, or for the border of an iteration."""
         core = self._core
         if worker in core.outlets or worker in core.inlets:
             return _Wait([_ELSEWHERE]) if self._at_rest else worker
         if not worker.port_name or worker.blocked & ENDED:
-            return _NEVER  # `start` has been triggered, and nobody counts on what a subscriber may still do
+            return _NEVER  # `start` has been triggered, and subscribers do not count
         return worker
 
     def _elsewhere(self) -> _Wait:
-        """The other parts wait as well: for whoever sends to them, or takes from them."""
+        """The other parts wait as well: for nodes that send to them, or take from them."""
         core = self._core
         sources = [edge.source for outlet in core.outlets for edge in outlet.in_edges]
         told = [(source, what) for source in sources for what in (_FIRE, _TELL)]
@@ -366,7 +369,7 @@ def _fire(worker: RunningNode) -> _Wait | RunningNode:
 
 
 def _counts(worker: RunningNode, waits_for: list[Action]) -> bool:
-    """Whether F8 holds its next firing by itself: not beside a rate, a gate or `ready()`, and not beside a call."""
+    """Whether only F8 holds its next firing: not also a rate, a gate, `ready()` or a call."""
     if worker.room.waiting:
         return True
     if worker.blocked & ~(FULL | AT_CONCURRENCY) or worker.busy not in BETWEEN_FIRINGS:
@@ -420,7 +423,7 @@ def _processing(worker: RunningNode) -> list[Action]:
 
 
 def _sending(edge: AnyEdge) -> Action:
-    """Who would put a token on this edge."""
+    """Return the action that would put a token on this edge."""
     source: RunningNode = edge.source
     if type(edge) is not EventEdge:
         return source, _FIRE
@@ -430,7 +433,7 @@ def _sending(edge: AnyEdge) -> Action:
 
 
 def _taking(edge: AnyEdge) -> Action:
-    """Who would take the oldest token from this edge."""
+    """Return the action that would take the oldest token from this edge."""
     target: RunningNode = edge.target
     called = edge.target_kind == "slot" or (edge.target_kind == "parameter" and type(edge) is EventEdge)
     return target, _CALL if called else _FIRE
@@ -461,7 +464,7 @@ def _works_on_firing(worker: RunningNode) -> bool:
 
 
 def is_held(worker: RunningNode) -> bool:
-    """Whether a full queue alone holds it back: code that waits for room, a slot call, or its next firing.
+    """Whether only a full queue holds it back: code that waits for room, a slot call, or its next firing.
 
     A rate that holds it too is to be over first.
     """
@@ -477,7 +480,7 @@ def is_held(worker: RunningNode) -> bool:
 
 
 def _goes_on(worker: RunningNode, what: str) -> bool:
-    """Whether code of it is in progress, or the timer of a rate that alone delays this, which say so when over."""
+    """Whether its code, or the timer of a rate that is the only delay, is in progress; both report their end."""
     if worker.execution.in_flight or (what == _FIRE and worker.blocked & RATE):
         return True
     return worker.concurrent is not None and worker.concurrent.working > 0

@@ -155,7 +155,7 @@ def activity_left(worker: RunningNode) -> None:
     The right of A3 stays until the firing or call is over.
     """
     if not worker.active:
-        return  # what it gave was none of its own (A4), or left before (A3)
+        return  # the activity was not its own (A4), or left before (A3)
     if worker.scope is not None:  # by its events it leaves everything inside (G2)
         worker.become(False)
         worker.core.rules.deactivate_inside(worker.scope, "sent")
@@ -215,7 +215,7 @@ def bring_activity(target: RunningNode) -> None:
 
 
 def _drain(edge: AnyEdge, lying: Lying) -> None:
-    """T4, F12: the token is processed at once, without a firing or call; its modifier acts behind the sending."""
+    """T4, F12: the token is processed immediately, without a firing or call; its modifier acts after the sending."""
     target: RunningNode = edge.target
     core = target.core
     modifier = lying[ACTIVITY]
@@ -237,7 +237,7 @@ def sent(core: Core) -> None:
     """The sending is on its edges: activity that got nowhere goes back, what was drained acts, the rest follows."""
     if core.returned:
         returned, core.returned = core.returned, []
-        for edge in returned:  # behind A5, which has taken it from the sender
+        for edge in returned:  # after A5, which has taken it from the sender
             give_back(edge)
     drained = core.drained
     if drained:
@@ -269,7 +269,7 @@ def announce(worker: RunningNode, written: Written, *, processed: bool = True) -
 
 
 def send_end(worker: RunningNode) -> None:
-    """END leaves on all outputs; from here the node, which is amid nothing, is over (F4, F12)."""
+    """END leaves on all outputs; from here on the node, which is idle, is over (F4, F12)."""
     core = worker.core
     end = (END, None, None)
     with deferring_events(core):
@@ -278,7 +278,7 @@ def send_end(worker: RunningNode) -> None:
         since = len(core.next_in_wave)
         _put_outputs(worker, [end] * len(worker.out_edges))
         queue_next_in_wave(core, since)
-        worker.leave()  # no firing or call goes on that could use it: the next slot call must not (A3)
+        worker.leave()  # no firing or call is in progress that could use it, and the next slot call must not (A3)
         sent(core)
         if core.trace_changes is not None:
             core.trace_changes(NodeEnded(core.now(), worker.path))
@@ -306,7 +306,7 @@ def trigger(
     worker = event.worker
     core = worker.core
     if core.over:
-        return  # code that was in progress at the end speaks to nobody
+        return  # code that was in progress at the end has no listeners
     value, explicit, stamp = unwrapped(value, explicit, stamp)
     if stamp is None:
         stamp = core.now() if worker.stamp is None else worker.stamp
@@ -358,7 +358,7 @@ def _signals(event: RunningEvent, explicit: int | None, *, may_carry: bool) -> l
 
 
 def _show_signal(event: RunningEvent, signal: Token[Any]) -> None:
-    """Who looks at the event sees the signal; subscribers hear of it when it is on its edges (F3)."""
+    """Taps on the event see the signal now; subscribers get it when it is on its edges (F3)."""
     core, port = event.worker.core, event.port
     if core.trace is not None:
         core.trace(EventTriggered(core.now(), event.label, signal))
@@ -405,7 +405,7 @@ def _append(edge: EventEdge, value: object, modifier: int, stamp: float) -> None
         _show(edge, Token(*lying))
     if core.sharing is not None:
         core.sharing.sent(edge, Token(*lying))
-    if edge.end_sent and value is not END:  # END came first: nobody waits for what comes behind it (F13)
+    if edge.end_sent and value is not END:  # END came first: no consumer waits for anything after it (F13)
         count_dropped(edge, Token(*lying), "ended")
         if modifier > 0:
             core.returned.append(edge)
@@ -442,7 +442,7 @@ def _has_made_room(edge: EventEdge, lying: Lying) -> bool:
 
 
 def emit_automatic(worker: RunningNode) -> None:
-    """Send the automatic events of a node that is amid nothing: at once, or behind a change of several edges."""
+    """Send the automatic events of an idle node: now, or after a change of several edges."""
     late = worker.core.deferred_events
     if late is None:
         send_automatic(worker)
@@ -452,7 +452,7 @@ def emit_automatic(worker: RunningNode) -> None:
 
 @contextmanager
 def deferring_events(core: Core) -> Iterator[None]:
-    """What arises by a change of several edges is told when all of it is done (F10, R4), by subgraphs last (G2)."""
+    """Automatic events of a change of several edges follow when all of it is done (F10, R4), subgraphs last (G2)."""
     if core.deferred_events is not None:
         yield
         return

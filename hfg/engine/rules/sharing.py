@@ -17,7 +17,7 @@ __all__ = ["need_unchanged", "need_unwritten", "taken"]
 
 
 def taken(worker: RunningNode, edges: Sequence[Edge], tokens: Sequence[Token[Any]]) -> None:
-    """A firing or call has taken these tokens. One that was changed on its edge is a failure of who has sent it."""
+    """A firing or call has taken these tokens. If one was changed on its edge, its sender has failed."""
     sharing = worker.core.sharing
     if sharing is None:
         return
@@ -47,7 +47,7 @@ def need_unchanged(worker: RunningNode) -> None:
 
 
 def need_unwritten(worker: RunningNode, port: str, value: Any) -> None:
-    """A node is about to send a value: it is none that was sent before and written to since, while others hold it.
+    """A node sends a value: refuse one that was sent before and written to since, while other nodes hold it.
 
     Raises:
       UsageError: it is.

@@ -1,4 +1,4 @@
-"""Which sources still work for somebody: those that do not are dead_sources, and keep no run alive (rule R5).
+"""Which sources still have a consumer: the others are dead sources, which do not keep a run alive (rule R5).
 
 Judged anew whenever a node ends, is enabled, disabled or reset, and when the structure changes; never per token. Stands
 on `agenda`.
@@ -16,7 +16,7 @@ __all__ = ["find_dead_sources"]
 
 
 def find_dead_sources(core: Core) -> None:
-    """Find the dead sources, and let them rest: one without end beside others would hide that those have stalled."""
+    """Find the dead sources, and let them rest: an endless one would hide that the others have stalled."""
     if not core.dead_sources and all(_works_for_somebody(one) for one in core.sources):
         return  # as mostly
     core.dead_sources = _for_nobody([one for one in core.sources if not one.blocked & (ENDED | DISABLED)])
@@ -29,7 +29,7 @@ def find_dead_sources(core: Core) -> None:
 
 
 def _works_for_somebody(source: RunningNode) -> bool:
-    """Whether it is over itself, or works for one that has not ended and is no source itself."""
+    """Whether it is over itself, or feeds a node that has not ended and is not a source."""
     return bool(source.blocked & (ENDED | DISABLED)) or any(
         not edge.joins() or not (edge.target.blocked & ENDED or edge.target.is_source)
         for edge in source.all_out_edges()

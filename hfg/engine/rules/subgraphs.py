@@ -41,7 +41,7 @@ def run_slot(scope: Scope, name: str, then: Callable[[], None]) -> None:
 def _each(workers: Iterable[RunningNode], action: Action, then: Callable[[], None]) -> None:
     """Do it to those at rest, one after the other in order of adding; a node in a firing or call follows after it.
 
-    Without recursion, for there may be thousands.
+    Without recursion, because there may be thousands.
     """
     rest = iter(workers)
     inside = done_inside = False

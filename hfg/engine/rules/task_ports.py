@@ -1,4 +1,4 @@
-"""What the code of tasks sends, which is beside the firings of their node (rules F3, T5, A3).
+"""Sendings of the tasks of a node, which are independent of its firings (rules F3, T5, A3).
 
 Installed on a node's ports when its code has started one by `start_soon`; others pay nothing. Depends on `sending`.
 """
