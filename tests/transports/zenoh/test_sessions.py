@@ -84,7 +84,8 @@ async def test_a_session_that_closes_withdraws_what_it_has_declared_before_zenoh
     there = present(second)
     first.announce("first")
     first.answer("name", answer)
-    await until(lambda: there == {"first"})
+    first.announce("answers")
+    await until(lambda: there == {"first", "answers"})
     assert await soon(second.ask("name", b"1")) == b"1"
     raw = first._raw
     monkeypatch.setattr(first, "_raw", SimpleNamespace(close=lambda: None))
