@@ -43,6 +43,7 @@ FOUND = (  # by the soak
     861003293,
     864005430,
     870000569,
+    880001756,
 )
 ORDERS = 50  # of permitted moves, where several would do
 MOST_MOVES = 1500

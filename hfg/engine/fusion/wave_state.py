@@ -213,7 +213,10 @@ class WaveState:
                     worker.run_after_wave()
             elif not worker.fireable and (agenda.make_fireable(worker) or worker.queued):
                 worker.go_before_calls()
-                worker.run_after_wave()
+                if worker in worker.group.policy:  # for a call (F9), so it keeps that place
+                    worker.run_next()
+                else:
+                    worker.run_after_wave()
         if not self.takes_turns and len(found) > 1:
             place = {worker: number for number, (worker, _) in enumerate(turns)}
             found.sort(key=place.__getitem__)
