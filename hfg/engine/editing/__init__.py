@@ -1,4 +1,4 @@
-"""What changes or holds a run while it goes on: edits, pause, steps, breakpoints.
+"""Changes of a running graph, and means to hold it: edits, pause, steps, breakpoints.
 
 edits        one edit after the other      turns     who edits now       holding   nodes at rest meanwhile
 plan_index   where everything is in a plan

@@ -226,7 +226,7 @@ class _Applying(Placing):
             core.gates.append(Gate(by.scope or by, drawn.idle_rate_hz, inside))
         states |= {gate.state: None for gate in core.gates}
         for worker in {worker: None for gate in core.gates for worker in gate.workers if worker not in gated}:
-            worker.rate.start_gated(float("-inf"))  # an idle rate counts from the first firing behind the gate
+            worker.rate.start_gated(float("-inf"))  # an idle rate counts from the first firing after the gate closes
             gated[worker] = None
         self.touched |= gated
         self.scopes |= {state: None for state in states if not isinstance(state, RunningNode)}

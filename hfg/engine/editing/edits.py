@@ -63,7 +63,7 @@ class _Following:
       changes: what was done to the declared graph.
       how: what that means to the plan.
       switched: who is enabled or disabled by it.
-      values: parameters with which nobody works yet.
+      values: parameters that no firing uses yet.
       copied: of each copy that it makes what it is a copy of, and what the parameters of that were then.
       come: new nodes, of which the setup has begun.
       fresh: nodes that are enabled by it, whose second setup has begun.
@@ -159,10 +159,10 @@ class Edits:
     async def _follow(
         self, changes: Sequence[Change], what: str, note: Callable[[], None], *, check: bool
     ) -> list[RunningNode]:
-        """Bring the run in line with the declared graph; if that fails, take back what was done to the graph.
+        """Bring the run in line with the declared graph; if that fails, undo the changes of the graph.
 
         Returns:
-          The workers that are gone and must be torn down. The next edit does not wait for that.
+          The workers that are gone and must be torn down. The next edit does not wait for their teardown.
         """
         engine = self._engine
         edit = _Following(changes)
@@ -341,7 +341,7 @@ class Edits:
 
 
 def _take_values(edit: _Following) -> None:
-    """Give a copy the values that the copied node has when the edit takes effect, if they were set since."""
+    """Set on a copy the values that were set on the copied node before the edit takes effect."""
     said = {(change.node, change.name) for change in edit.changes if isinstance(change, ParameterChange)}
     for change, before in edit.copied:
         for name, value in change.source._parameters.items():

@@ -138,7 +138,7 @@ class Pausing:
         return Step((worker.path,))
 
     async def wave(self) -> Step:
-        """Let each node make at most one firing and one call, including nodes that become enabled by that."""
+        """Let each node make at most one firing and one call, including nodes that these enable."""
         self._begin("a wave")
         moved: list[str] = []
         done: set[tuple[RunningNode, str]] = set()

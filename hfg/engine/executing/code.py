@@ -400,7 +400,7 @@ class CodeRunner:
         return left
 
     async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
-        """Trigger, then wait until no `wait` queue behind the node's events is full (F8).
+        """Trigger, then wait until no `wait` queue that the node's events fill is full (F8).
 
         Before the start tasks wait too, but not `setup()`, because the start waits for it. After the end of the run,
         code that sends in an endless loop yields here each time; otherwise it would block the loop, uncancellable.

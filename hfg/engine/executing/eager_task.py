@@ -3,7 +3,7 @@
 A coroutine that runs outside a task breaks `asyncio.timeout`, `anyio` and everything else that asks for the current
 task. A new task for each firing costs a pass of the loop. So each async node has one dormant task, whose identity and
 context are entered around every step of its coroutines. The task itself awaits a future that passes cancellation on to
-the coroutine. What a coroutine waits for wakes it directly, as it would a task, but without another pass of the loop.
+the coroutine. The awaited future wakes the coroutine directly, like a task, but without another pass of the loop.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ class OrphanTasks:
         worker = next((worker for worker in (asking() for asking in self._asking) if worker is not None), None)
         if worker is not None and _is_asked_for_by(worker, sys._getframe(1)):  # noqa: SLF001
             self._tasks[task] = worker
-            setattr(task, _PATH, worker.path)  # when it is told of, weak references are gone
+            setattr(task, _PATH, worker.path)  # when it is reported, weak references are gone
         return task
 
     def _hear(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:

@@ -129,7 +129,7 @@ class TaskRunner:
             core.current = None
 
     def limit(self, task: Task, limit_s: float) -> None:
-        """Leave a cancelled task behind if it takes longer; at the end of a run one limit holds for all (X3)."""
+        """Abandon a cancelled task if it takes longer; at the end of a run, one limit holds for all (X3)."""
         if task in self.under_way and not self._core.over:
             task.limit = self._core.after(limit_s, partial(self._give_up, task, limit_s))
 

@@ -45,7 +45,7 @@ class TimeHold:
         self.give_up_at: float | None = None
 
     def limit(self, seconds: float, give_up: Callable[[], None]) -> None:
-        """Have `give_up` called if it is not back after so many real seconds."""
+        """Call `give_up` if it is not back after that many real seconds."""
         self.give_up = give_up
         self.give_up_at = time.monotonic() + seconds
 
@@ -95,7 +95,7 @@ class _JumpingSelector(selectors.DefaultSelector):
 
 
 class _Timer(asyncio.TimerHandle):
-    """Rings behind those of the same moment that were set before it; the heap of asyncio alone keeps no order."""
+    """Fires after earlier timers of the same moment; asyncio's heap does not keep their order."""
 
     def __init__(self, number: int, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -185,7 +185,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         return held
 
     def drop(self, held: TimeHold) -> None:
-        """Nobody waits for this work any more."""
+        """No caller waits for this work any more."""
         if held in self._held:
             self._held.remove(held)
 
@@ -214,6 +214,6 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
             self._virtual_now = max(self._virtual_now, scheduled[0].when())
         else:
             self._virtual_now += timeout
-        self._clock_resolution = max(_RESOLUTION_S, math.ulp(self._virtual_now))  # after a season a float is no finer
+        self._clock_resolution = max(_RESOLUTION_S, math.ulp(self._virtual_now))  # after months, floats are not finer
         for watcher in self.watchers:
             watcher(self._virtual_now - before)

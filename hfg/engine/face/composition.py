@@ -62,7 +62,7 @@ class Composition:
     Attributes:
       consumers: who listens to the trace.
       taps: who looks at ports and edges.
-      outputs: what came out of the graph's own outputs, where nobody reads them.
+      outputs: values of the graph's own outputs that are not read.
     """
 
     def __init__(self, flat: FlatGraph, settings: Settings, others: Others | None = None) -> None:
@@ -108,7 +108,7 @@ class Composition:
 
     @property
     def measuring(self) -> Measuring:
-        """What keeps statistics: from now on, if nobody has asked before."""
+        """The measurements, which begin now unless they have before."""
         if self._measuring is None:
             self._measuring = Measuring(self.engine)
         return self._measuring
@@ -117,7 +117,7 @@ class Composition:
 
     @property
     def ending(self) -> bool:
-        """Whether somebody has begun to wait for the end, and so hears of a failure."""
+        """Whether a caller waits for the end, and so gets a failure."""
         return self._done is not None
 
     def stay_open(self) -> None:
@@ -132,7 +132,7 @@ class Composition:
             self.engine.quiet.unhold()
 
     async def close(self) -> None:
-        """Tear the run down, once; whoever comes later waits for that.
+        """Tear the run down, once; later callers wait until it is torn down.
 
         Raises:
           HfgError: the run has failed.

@@ -31,7 +31,7 @@ T = TypeVar("T")
 class Feed(Generic[T]):
     """Brings tokens into a graph input; while it is open it holds the run open (R5).
 
-    Leaving the block sends END behind the last token, unless `end=False` or an exception leaves it. It waits until
+    Leaving the block sends END after the last token, unless `end=False` or an exception leaves it. It waits until
     threads have sent what they had begun to send, but not for END's place.
     """
 
@@ -167,7 +167,7 @@ class _Waiting:
 
 
 def need_sendable(activity: int | None, stamp: float | None) -> None:
-    """Refuse what is no activity modifier, or no stamp."""
+    """Refuse an invalid activity modifier or stamp."""
     if stamp is not None and not isinstance(stamp, int | float):
         raise UsageError(f"stamp must be seconds on the run's clock, or None for what rule T5 says, got {stamp!r}")
     if activity not in (None, -1, 0, 1):
@@ -191,7 +191,7 @@ def _check_running(engine: Engine) -> None:
 
 
 async def read(engine: Engine, worker: RunningNode) -> AsyncIterator[Any]:
-    """Give out the values of a graph output, with back-pressure, until END or the end of the run (P10)."""
+    """Yield the values of a graph output, with back-pressure, until END or the end of the run (P10)."""
     if not worker.live_inputs:
         raise UsageError(f'graph output "{worker.port_name}" is not connected: nothing will come out of it')
     engine.quiet.readers.append(worker)
@@ -215,7 +215,7 @@ async def read(engine: Engine, worker: RunningNode) -> AsyncIterator[Any]:
 
 
 def collect(engine: Engine, worker: RunningNode, values: list[Any]) -> None:
-    """Read a graph output into a list, for runs that nobody reads."""
+    """Read a graph output into a list, for runs whose outputs are not read."""
 
     def step(worker: RunningNode) -> None:
         worker.use_turn()
@@ -233,7 +233,7 @@ async def signal(
 ) -> None:
     """Bring a signal into a slot from outside, as if by an edge that is active; waits while its queue is full (F8).
 
-    The signal takes its place behind all that wait already. To a node that is disabled nothing is sent (F10).
+    The signal goes to the end of the queue. Nothing is sent to a disabled node (F10).
     """
     _check_running(engine)
     edge = worker.core.outside.get((worker.index, slot))

@@ -538,7 +538,7 @@ class Run:
         Raises:
           RunError: the run failed, stalled or was aborted.
         """
-        await asyncio.sleep(0)  # tasks that were begun beside us open their feeds and readers first
+        await asyncio.sleep(0)  # tasks that were started together with us open their feeds and readers first
         self._parts.let_end()
         await self._engine.ending.wait()
         await self._parts.close()
@@ -665,7 +665,7 @@ class Run:
         )
 
     def _adopt(self, event: EventPort[Any]) -> None:
-        """Somebody has subscribed to an automatic event, or to `start`; asked by the event."""
+        """An automatic event, or `start`, has got a subscriber; called by the event."""
         if event is self.graph.start:
             bind_start(self._engine.worker_of(self.graph), event)
         else:

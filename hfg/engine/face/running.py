@@ -258,7 +258,7 @@ def run(
 
 
 def _run_blocking(graph: Graph, clock: Clock, settings: Settings, begin: Callable[[Run], object] | None) -> Report:
-    """Run it in an event loop of its own; Ctrl-C ends the run well, and is told when that is over."""
+    """Run it in its own event loop. Ctrl-C ends the run properly and is raised afterwards."""
     factory = VirtualTimeLoop if clock == "virtual" else PunctualLoop
     ctrl_c = CtrlC()
     runner = asyncio.Runner(loop_factory=factory)
@@ -274,7 +274,7 @@ def _run_blocking(graph: Graph, clock: Clock, settings: Settings, begin: Callabl
 
 
 class _Block(AbstractAsyncContextManager[Run]):
-    """What `running` gives: a block in async code, and a sentence for whoever forgets that."""
+    """The result of `running`: an async context manager, with a clear error for a plain `with`."""
 
     def __init__(self, block: AbstractAsyncContextManager[Run], name: str) -> None:
         self._block = block
@@ -399,6 +399,6 @@ class _Guard:
 
 
 async def _quietly(closing: Coroutine[Any, Any, None]) -> None:
-    """The failure of the run is raised by whoever waits for it, not by its clean-up."""
+    """Tear the run down without raising its failure, which the code that waits for it raises."""
     with contextlib.suppress(HfgError):
         await closing

@@ -46,7 +46,7 @@ class Question(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
       path: of a tap: a port or an edge.
-      max_rate_hz: of a tap: at most so many tokens a second.
+      max_rate_hz: of a tap: at most this many tokens per second.
       json: of a tap: tokens as JSON, not for people.
     """
 
@@ -106,7 +106,7 @@ class Door:
         self.name = Answer(os.getpid(), run.graph.name, target, name=name)
 
     def answer(self, line: bytes) -> Answer | Question:
-        """Answer one question; a tap's is given back."""
+        """Answer one question. Return that of a tap, which goes on being answered."""
         try:
             question = msgspec.json.decode(line, type=Question)
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
@@ -118,7 +118,7 @@ class Door:
         return msgspec.structs.replace(self.name, glance=self.run.glance())
 
     async def close(self) -> None:
-        """Send everybody away, and see them gone: a loop that ends before that leaves their sockets open."""
+        """Close all connections and wait until they are gone: a loop that ends earlier leaves their sockets open."""
         self.closed = True
         await asyncio.sleep(0)  # who was let in at this very moment knocks in the loop's next pass
         if self.studio is not None:
@@ -137,11 +137,11 @@ class Door:
 
 @asynccontextmanager
 async def watched(run: Run, watch: bool | str) -> AsyncIterator[None]:
-    """Let others look inside the block, if they may. If that cannot be, the block goes on, and a log record says why.
+    """Let others watch the run inside the block, if allowed. If that fails, only a log record says why.
 
     Args:
       run: what they see.
-      watch: whether they may, or what they are told the program is called.
+      watch: whether they may, or the name of the program that they see.
     """
     if not watch:
         yield

@@ -204,7 +204,7 @@ class ConcurrentFirings(Record, Generic[NodeT]):
         return first if first is not None and first.outcome else None
 
     def begin_leaving(self, leaving: bool) -> None:
-        """Whoever is sending continues with the next one by itself if sending frees its outputs."""
+        """The sending firing continues with the next one by itself if its sending frees the outputs."""
         self.leaving = leaving
 
     def leave(self, firing: ConcurrentFiring[NodeT]) -> None:

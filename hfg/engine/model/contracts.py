@@ -1,4 +1,4 @@
-"""What the model requires of a node below the class of nodes, `running_node.RunningNode`; and of timers and tasks.
+"""Protocols of the model: of a node, for modules below `running_node.RunningNode`, and of timers and tasks.
 
 A node refers to its group, its subgraphs and the run, and each of these refers to its nodes. Imports still go one way,
 because everything below the class of nodes is generic in it: `NodeT`. `hfg.engine.model` has the names with it filled
@@ -24,7 +24,7 @@ class Timer(Protocol):
 
 
 class EagerTask(Protocol):
-    """What runs coroutines of a node; see `executing.eager_task`."""
+    """A task that runs a coroutine of a node; see `executing.eager_task`."""
 
     task: Any
 
@@ -49,7 +49,7 @@ class EagerTask(Protocol):
 
 
 class _Counts(Protocol):
-    """What the run counts of the work that a node has in progress."""
+    """The run's counts of the work that a node has in progress."""
 
     tasks: int
     waiting_room: int
@@ -70,7 +70,7 @@ class _Watched(Protocol):
 
 
 class _Node(Protocol):
-    """What firings, tasks, subgraphs, gates and borders require of a node; `RunningNode` describes it."""
+    """A node as firings, tasks, subgraphs, gates and borders need it; `RunningNode` describes it."""
 
     path: str
     type: Any

@@ -1,6 +1,6 @@
 """The state of one run, which its decisions share.
 
-Decisions never wait: time, threads and coroutines are behind `Runtime` and `Code`, which asyncio implements in higher
+Decisions never wait: `Runtime` and `Code` stand for time, threads and coroutines, which asyncio implements in higher
 layers. This module is below the class of nodes, and so is generic in it.
 """
 
@@ -121,7 +121,7 @@ class FusedRegion(Protocol[NodeT]):
 
 
 class Runtime(Protocol[NodeT]):
-    """What decisions need from the waiting part of the engine."""
+    """The waiting part of the engine, as decisions need it."""
 
     def now(self) -> float:
         """Return seconds on the run's clock."""
@@ -162,7 +162,7 @@ class Runtime(Protocol[NodeT]):
 
 
 class Code(Protocol[NodeT]):
-    """What runs the code of nodes where it belongs; `done(result, error)` follows, at once or later on the loop."""
+    """Runs the code of nodes where it belongs, then calls `done(result, error)`, immediately or later on the loop."""
 
     def execute(self, worker: NodeT, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
         """Run a node's code."""
@@ -202,7 +202,7 @@ class Code(Protocol[NodeT]):
 
 
 class RuleCallbacks(Protocol[NodeT]):
-    """What higher modules do when lower ones get there, so that imports go down only."""
+    """Functions of higher modules that lower ones call, so that imports only go down."""
 
     def idle_again(self, worker: NodeT) -> None:
         """A node is no longer busy."""

@@ -42,7 +42,7 @@ class Group(Generic[NodeT]):
     Attributes:
       push: queues a node that can move; push_next: ahead of all others, if the policy allows it.
       take: returns what is to be stepped next.
-      in_a_row: nobody needs to see each turn by itself, so a step may continue with the next in the queue.
+      in_a_row: no observer needs to see each turn by itself, so a step may continue with the next in the queue.
       budget: how many nodes may move before the pump looks at other things, including the current one; 1 if it is not
         the pump that lets them.
       signal_step: of all its nodes that only have slots which events feed, once there is one.

@@ -87,7 +87,7 @@ class NodeState(Vertex[NodeT], Record):
         self.fireable = False
 
     def take_place(self) -> None:
-        """A wave keeps it a place in the ready queue, in front of what the queue holds; slot calls wait behind it."""
+        """A wave keeps it a place at the front of the ready queue; slot calls wait after it."""
         self.queued = True
 
     def go_before_calls(self) -> None:
@@ -190,7 +190,7 @@ class NodeState(Vertex[NodeT], Record):
         return self.taken
 
     def outputs_free(self) -> tuple[Any, ...]:
-        """All that it has sent is processed. Return the edges to release because of that."""
+        """All that it has sent is processed. Return the edges to release now."""
         if not self.holds_inputs:
             return ()
         self.holds_inputs = False
@@ -285,7 +285,7 @@ class NodeState(Vertex[NodeT], Record):
             self.node._active = False
 
     def give_away_activity(self) -> None:
-        """What it sends has taken its activity (A5); it may carry more until its call is over (A3)."""
+        """Its tokens have taken its activity (A5); more may carry it until the call is over (A3)."""
         self.active = self.node._active = False
         self.may_carry = self.stamp is not None
 

@@ -32,7 +32,7 @@ __all__ = [
 class Fifo(deque[RunningNode]):
     """First in, first out among waves, and within a wave depth first: the default.
 
-    What a firing enables over sequential edges goes ahead of all that waits, so a wave ends before the next one starts
+    Nodes that a firing enables over sequential edges go ahead of all others, so a wave ends before the next one starts
     (R2).
     """
 

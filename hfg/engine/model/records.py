@@ -1,4 +1,4 @@
-"""What belongs together in the state of one running node, each part with its transitions and its invariants.
+"""Parts of the state of one running node, each with its transitions and invariants.
 
 The parts depend on each other only where a docstring says so. `RunningNode` owns them. Hot paths read them directly.
 """

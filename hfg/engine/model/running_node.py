@@ -60,7 +60,7 @@ AT_CONCURRENCY: Final = 512  # as many firings are in progress as may be, or som
 FULL: Final = 1024  # a `wait` edge of its events is full (F8)
 BACKOFF: Final = 2048  # between teardown and setup after an error (X1)
 TORN_DOWN: Final = 4096  # the run is ending (R5, X3)
-RECORDED: Final = 8192  # what it sends is recorded without loss, and the disk is behind
+RECORDED: Final = 8192  # its tokens are recorded without loss, and the disk is too slow
 NO_CALLS: Final = FULL  # the least of them
 FIRES_NO_MORE: Final = ENDED | DISABLED | REMOVED | TORN_DOWN | UNWIRED | DEAD_SOURCE  # whatever arrives
 
@@ -75,7 +75,7 @@ def _not_planned(node: RunningNode) -> None:
 
 @dataclass(slots=True, eq=False, repr=False)
 class RunningNode(NodeState["RunningNode"]):
-    """What a node is while its graph runs."""
+    """The state of a node while its graph runs."""
 
     step: Step = _not_planned  # does its next piece of work; `specialise` chooses it
 

@@ -47,18 +47,18 @@ class Scope(Generic[NodeT]):
             member.enclose((*member.around, self))
 
     def move(self, path: str, parent: Scope[NodeT] | None) -> None:
-        """Give it another path and place it last in another subgraph."""
+        """Change its path and place it last in another subgraph."""
         self.path = path
         self.parent = parent
         if parent is not None:
             parent.children.append(self)
 
     def rename(self, path: str) -> None:
-        """Give it another path."""
+        """Change its path."""
         self.path = path
 
     def renumber(self, index: float) -> None:
-        """Give it another place in the order of all."""
+        """Change its place in the order of all."""
         self.index = index
 
     def forget_gates(self) -> None:

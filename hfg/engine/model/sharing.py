@@ -196,7 +196,7 @@ class _Sent:
 
 
 class Sharing:
-    """Who uses which values of a run; only on the loop."""
+    """Which nodes use which values of a run; only on the loop."""
 
     def __init__(self) -> None:
         self._lying: dict[Edge, deque[_Lease]] = {}
@@ -227,7 +227,7 @@ class Sharing:
         refs = self._count(array)
         held = before is not None and before.looks != looks and before.is_held_beside(array, way, refs)
         if held and before is not None:
-            gc.collect()  # what only garbage refers to is held by nobody
+            gc.collect()  # references from garbage do not count
             refs = self._count(array)
             held = before.is_held_beside(array, way, refs)
         if before is None or before.array() is not array:

@@ -1,4 +1,4 @@
-"""What observes the tokens on an edge (rule R7), and how a fused region serves it.
+"""Observers of the tokens on an edge (rule R7), and how a fused region serves them.
 
 A tap is called with each token. In a fused region there are no tokens, so a tap that does not need each one at once
 receives a whole wave, which costs a fraction.

@@ -100,7 +100,7 @@ class Tasks(Generic[NodeT]):
     _worker: NodeT
     doing: Doing[NodeT] = field(default_factory=Doing)  # most node types have no do-activity
     waiting_room: int = 0  # how many wait until a queue has room (F8)
-    problems: list[NodeError] = field(default_factory=list)  # failures of cancelled ones, for whoever ends them
+    problems: list[NodeError] = field(default_factory=list)  # failures of cancelled ones, for the code that ends them
     _in_progress: dict[Task[NodeT], None] = field(default_factory=dict)
     _on_rest: list[Callable[[], None]] = field(default_factory=list)
 
@@ -128,7 +128,7 @@ class Tasks(Generic[NodeT]):
         self._worker.core.tasks += 1
 
     def over(self, task: Task[NodeT]) -> None:
-        """One has ended. After the last one, call back whoever waits for that."""
+        """One has ended. After the last one, call the waiting callback."""
         del self._in_progress[task]
         self._worker.core.tasks -= 1
         if not self._in_progress:

@@ -35,7 +35,7 @@ _shared: dict[NodeType, _Shared] = {}
 
 
 class Shape:
-    """What the live edges of a vertex mean for each of its firings; computed once, not for each token.
+    """Facts about a vertex that follow from its live edges; computed once, not for each token.
 
     Attributes:
       sequential: inputs whose tokens are processed when its outputs are (F5).
@@ -220,7 +220,7 @@ class Vertex(Generic[NodeT]):
         self.push, self.push_next = group.push, group.push_next
 
     def rename(self, path: str) -> None:
-        """Give it another path."""
+        """Change its path."""
         self.path = path
 
     def enable_itself(self, enabled: bool) -> bool:

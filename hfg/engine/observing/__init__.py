@@ -1,4 +1,4 @@
-"""Who looks at a run: listeners, taps, statistics, reports.
+"""Observers of a run: listeners, taps, statistics, reports.
 
 consumers   of the trace        taps        at ports and edges
 tables      how print shows them

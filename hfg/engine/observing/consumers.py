@@ -1,4 +1,4 @@
-"""Who listens to a run (rule R7): consumers of the trace, called at once or behind a buffer of their own.
+"""Listeners of a run (rule R7): consumers of the trace, called directly or through their own buffer.
 
 A plain function is called with each event as it happens, on the loop: it loses nothing and its time is the graph's.
 One that is slow goes behind a buffer, a plain one on a thread of its own, an async one in a task: it loses its own
@@ -27,8 +27,8 @@ __all__ = ["Consumers", "Listener", "check_consumer"]
 
 _LOGGER = Log("hfg.engine")
 _BUFFER = 10_000  # events, for an async consumer that does not say
-_LAST_S = 1.0  # how long those behind a buffer may go on when the run is over
-_CANCELLED_S = 0.3  # and when they were cancelled for that
+_LAST_S = 1.0  # how long those with a buffer may continue when the run is over
+_CANCELLED_S = 0.3  # and after they were cancelled
 
 Take = Callable[[TraceEvent], Any]
 Sieve = Callable[[TraceEvent], bool]
@@ -90,7 +90,7 @@ class Listener:
                 self.failed(error)
 
     def failed(self, error: BaseException) -> None:
-        """It raised: it is logged and removed, and the run goes on (R7)."""
+        """It raised: it is logged and removed, and the run continues (R7)."""
         self.error = error
         _LOGGER.error("a consumer of the trace failed and was removed", exc_info=error)
         self.remove()
@@ -100,12 +100,12 @@ class Listener:
 
 
 class _Buffered(Listener):
-    """Behind a bounded buffer: what it is too slow for is dropped, oldest first."""
+    """A consumer with a bounded buffer: when it is too slow, the oldest events are dropped."""
 
     def __init__(self, consumer: Any, consumers: Consumers, size: int) -> None:
         super().__init__(consumer, consumers)
         self.kept: deque[TraceEvent] = deque(maxlen=size)
-        self.taken = 0  # written by the consumer's side alone, `put` by the run's: so no lock is needed
+        self.taken = 0  # only the consumer writes it, and only the run writes `put`: no lock is needed
         self.put = 0
         self.idle = True
         self.ended = False
@@ -272,7 +272,7 @@ class Consumers:
         self.changed()
 
     def changed(self) -> None:
-        """One came or went. Nobody listens: nothing is built. One: it is called. Several: one after the other."""
+        """One came or went. Build nothing for none, call a single one directly, and several one after the other."""
         self._listeners = [listener for listener in self._listeners if listener.is_open]
         core = self._engine.core
         core.trace_changes = _all_of([listener.take for listener in self._listeners])
@@ -288,14 +288,14 @@ class Consumers:
                 specialise(worker)
 
     async def end(self) -> None:
-        """The run is over: those behind a buffer take what lies in it, all together within a second."""
+        """The run is over: those with a buffer take the rest of it, all together within a second."""
         async with anyio.create_task_group() as ending:
             for listener in list(self._listeners):
                 ending.start_soon(listener.end)
 
 
 def _sieved(sieve: Sieve, take: Take) -> Take:
-    """What gives only some events on."""
+    """Return a function that passes on only some events."""
 
     def tell(event: TraceEvent) -> None:
         if sieve(event):
@@ -305,7 +305,7 @@ def _sieved(sieve: Sieve, take: Take) -> Take:
 
 
 def _all_of(takes: Sequence[Take]) -> Take | None:
-    """What gives an event to each of them."""
+    """Return a function that passes an event to each of them."""
     if len(takes) < 2:
         return takes[0] if takes else None
 

@@ -24,7 +24,7 @@ class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
       path: where it stands in the graph.
       group: where it runs.
       done: firings and slot calls so far.
-      busy_s: for how long its code kept its group busy, on the machine's clock, since somebody looks.
+      busy_s: for how long its code kept its group busy, on the machine's clock, since the first look.
       queued: untaken tokens in front of it.
       failed: failed firings and calls so far.
       active: A(v).

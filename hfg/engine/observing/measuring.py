@@ -170,7 +170,7 @@ class Measuring:
         self._timer = self._engine.loop.call_later(pause, self._look, context=self._engine.context)
 
     def _passed(self, seconds: float) -> None:
-        """So much time has passed on the run's clock."""
+        """Time has passed on the run's clock."""
         if self._engine.core.over:
             return
         self._engine.core.settle_barriers()

@@ -87,9 +87,9 @@ class Report(msgspec.Struct, frozen=True):
       firings: all firings of all nodes.
       nodes: by path.
       edges: by label, "source -> target".
-      outputs: what came out of the graph's own outputs, where nobody read them.
+      outputs: values of the graph's own outputs that were not read.
       errors: failures that did not end the run (X1, X3), as sentences.
-      lost_activity: how often activity was discarded with nobody to give it back to (A8).
+      lost_activity: how often activity was discarded and could not be returned (A8).
       clocks: by group on another machine, by how many seconds its clock may differ from the run's, at most (T5).
     """
 
@@ -104,7 +104,7 @@ class Report(msgspec.Struct, frozen=True):
     clocks: dict[str, float] = {}
 
     def __str__(self) -> str:
-        """A table of the nodes, and one of the edges; what nobody has is left out."""
+        """A table of the nodes, and one of the edges; empty columns are left out."""
         lines = [f"{self.outcome} after {seconds(self.duration_s)}, {self.firings} firings"]
         nodes = [
             (path, one.firings, one.silent, one.calls, one.failed, one.retries, one.restarts, one.active, one.ended)
@@ -187,7 +187,7 @@ class RunPage(Protocol):
           file: WebM, MP4 or Ogg; which codecs are played is up to the browser: VP8 and VP9 are, everywhere.
           caption: stands below it.
           starts_s: which time of the run its beginning shows.
-          speed: so many seconds of the run pass in one of the video.
+          speed: seconds of the run per second of the video.
 
         Raises:
           UsageError: it cannot be read, is larger than 64 MB, or a number is none.
@@ -202,7 +202,7 @@ class RunPage(Protocol):
           section: its title.
           graph: the one that runs, or `subgraph.graph` of one in it.
           caption: stands below it.
-          depth: so many subgraphs inside each other are shown open; None folds none.
+          depth: how many levels of subgraphs are shown open; None shows all.
           fold: paths of subgraphs that are folded whatever the depth.
         """
 

@@ -101,7 +101,7 @@ class GroupStatistics(msgspec.Struct, frozen=True):
 
 
 class Statistics(msgspec.Struct, frozen=True):
-    """What a run has done so far; counts from its start, times since they are measured.
+    """Figures of a run so far: counts since its start, times since they are measured.
 
     Attributes:
       outcome: "running", or how it ended.
@@ -113,7 +113,7 @@ class Statistics(msgspec.Struct, frozen=True):
       nodes: by path, those inside iterating subgraphs too.
       edges: by label, "source -> target".
       groups: by name.
-      lost_activity: how often activity was discarded with nobody to give it back to (A8).
+      lost_activity: how often activity was discarded and could not be returned (A8).
       errors: failures that did not end the run (X1).
       ages_s: how old that is which was said by each group with a process of its own (see `Run.refresh`), by its name.
     """
@@ -132,7 +132,7 @@ class Statistics(msgspec.Struct, frozen=True):
     ages_s: dict[str, float] = {}
 
     def __str__(self) -> str:
-        """A table of the nodes, and one of the edges; what nobody has is left out."""
+        """A table of the nodes, and one of the edges; empty columns are left out."""
         nodes = [
             (
                 path,

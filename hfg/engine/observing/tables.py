@@ -8,7 +8,7 @@ __all__ = ["seconds", "table"]
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
-    """Return the lines of a table; what is behind the first column stands to the right, empty columns are left out."""
+    """Return the lines of a table. Columns after the first are aligned right; empty ones are left out."""
     cells = [[_text(cell) for cell in row] for row in rows]
     shown = [index for index in range(len(columns)) if index == 0 or any(row[index] for row in cells)]
     lines = [[columns[index] for index in shown], *([row[index] for index in shown] for row in cells)]

@@ -39,7 +39,7 @@ _Where: TypeAlias = Port | InnerSource[Any] | InnerTarget[Any] | DrawnEdge | End
 class Tap:
     """Tokens as they pass a port or an edge of a run, markers too: an async iterator that ends with the run.
 
-    It looks from the moment it is made until `close()`, the end of a `with` block, or until nobody holds it any more.
+    It looks from the moment it is made until `close()`, the end of a `with` block, or until it is garbage.
 
     Attributes:
       passed_s: when the token that was iterated over last passed, in seconds since the run began.
@@ -76,7 +76,7 @@ class Tap:
         return kept
 
     def close(self) -> None:
-        """TokenTap no more; the iteration ends behind what is kept. Does nothing the second time."""
+        """Stop observing; the iteration ends after the tokens that are kept. The second call does nothing."""
         self._detach()
         self._buffer.end()
 
@@ -119,7 +119,7 @@ class Tap:
 
 
 class Looker(Protocol):
-    """Who looks at what passes."""
+    """An observer of passing tokens."""
 
     @property
     def put(self) -> TokenTap:
@@ -130,7 +130,7 @@ class Looker(Protocol):
 
 
 class _Buffer:
-    """What a tap keeps; held by what it looks at, while the tap is held by whoever reads it."""
+    """The tokens that a tap keeps. The observed port or edge refers to it; the reader refers to the tap."""
 
     def __init__(self, size: int, elapsed: Callable[[], float]) -> None:
         self.size = size
@@ -149,7 +149,7 @@ class _Buffer:
         self.more.set()
 
     def miss(self, count: int) -> None:
-        """So many have passed where nobody could keep them."""
+        """Tokens have passed that could not be kept: `count` of them."""
         self.seen += count
 
     def end(self) -> None:
@@ -167,7 +167,7 @@ def make_tap(
       size: tokens that are kept for the reader.
       max_rate_hz: at which tokens are given.
       elapsed: gives the seconds since the run began.
-      detach: is called when nobody reads any more.
+      detach: called when the tap is closed or garbage.
 
     Raises:
       UsageError: the size or the rate cannot be.
@@ -219,7 +219,7 @@ class Taps:
         return partial(self._remove, looker)
 
     def workers(self, looker: Looker) -> list[RunningNode]:
-        """Those whose tokens somebody looks at, as the graph is now."""
+        """The observed ports and edges, as the graph is now."""
         found: dict[RunningNode, None] = {}
         for place, _ in self._buffers.get(looker, (None, []))[1]:
             if isinstance(place, RunningEvent):
@@ -327,7 +327,7 @@ class Taps:
         return places if edge is None else [*places, (edge, [])]
 
     def _of_this_run(self, what: object) -> _Where:
-        """Refuse what is no port or edge of the graph that runs."""
+        """Refuse anything except a port or an edge of the running graph."""
         if isinstance(what, Node):
             kind = what._type
             names = dict.fromkeys([*kind.inputs, *kind.outputs, *kind.events, *kind.slots])

@@ -367,7 +367,7 @@ class Inlet:
 
     @property
     def hearing(self) -> Hearing:
-        """What its consumer does with tokens; even an ended one gets those that carry activity (F12)."""
+        """Whether its consumer takes tokens; even an ended one gets those that carry activity (F12)."""
         if not reaches(self._edge):
             return "deaf"
         over = self._joins and not self._edge.active and self._edge.target.blocked & ENDED

@@ -34,7 +34,7 @@ class Edited(msgspec.Struct, frozen=True):
 
 @dataclass(slots=True)
 class Callbacks:
-    """What to call, in the order in which it was added."""
+    """Callbacks, in the order in which they were added."""
 
     # The nodes are set up, `start` is on its edges and the sources may fire, but nothing has moved yet (A10).
     begun: list[Callable[[], None]] = field(default_factory=list)

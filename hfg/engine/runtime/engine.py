@@ -121,7 +121,7 @@ class Engine:
         self.moving_since: float | None = None
         self.ending: asyncio.Event = asyncio.Event()
         self._scheduled = False
-        self._resumed: deque[Callable[[], None]] = deque()  # code that goes on when all is done that is ready now
+        self._resumed: deque[Callable[[], None]] = deque()  # code that continues after all that is ready
         self._thread = threading.get_ident()
         self._ready_groups: deque[Dispatching] = self.core.ready_groups
         self.scheduler = rx.RunScheduler(self)
@@ -497,5 +497,5 @@ class Engine:
 
     @property
     def error(self) -> HfgError | None:
-        """What the run failed with, or None."""
+        """The error that the run failed with, or None."""
         return None if self.ended_how is None else self.ended_how[1]

@@ -1,4 +1,4 @@
-"""Ctrl-C in `hfg.run`: the run is torn down and left within two seconds, also while a node blocks the loop.
+"""Ctrl-C in `hfg.run`: the run is torn down and left within two seconds, even while a node blocks the loop.
 
     first Ctrl-C ── the run is cancelled and torn down ─────────────────────────────┬─ KeyboardInterrupt, with a
     sentence
@@ -41,7 +41,7 @@ def named(graph: Graph) -> str:
 
 
 class CtrlC:
-    """What Ctrl-C does during one run.
+    """The handler of Ctrl-C during one run.
 
     Attributes:
       count: how often it was pressed.
@@ -62,7 +62,7 @@ class CtrlC:
 
     @contextmanager
     def handled(self, loop: asyncio.AbstractEventLoop) -> Iterator[None]:
-        """Handle Ctrl-C inside the block, if nobody else does and this is the main thread."""
+        """Handle Ctrl-C inside the block, if no other handler is set and this is the main thread."""
         main = threading.current_thread() is threading.main_thread()
         if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
             yield

@@ -22,7 +22,7 @@ class Quiet:
     Attributes:
       readers: the graph outputs that are read from outside now, so that tokens at them will be taken.
       read_out: those whose END was read.
-      senders: feeds for which somebody outside has a token, once for each.
+      senders: feeds for which a caller outside has a token, once for each.
     """
 
     def __init__(self, core: Core, *, virtual: bool) -> None:

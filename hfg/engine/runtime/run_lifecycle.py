@@ -261,7 +261,7 @@ class RunLifecycle:
         await self._last()
 
     def _let_go(self) -> None:
-        """Whatever happened: nothing of the run goes on, and the graph is free."""
+        """Whatever happened: nothing of the run continues, and the graph is free."""
         engine = self._engine
         for worker in engine.core.workers:
             engine_ports.release_ports(worker)
@@ -287,7 +287,7 @@ class RunLifecycle:
         return eager_tasks + list(engine.code.given_up)
 
     async def _end_carriers(self) -> None:
-        """What still resists is cancelled once more and has one limit for all of it together; then it is dropped."""
+        """Cancel the remaining tasks once more, with one limit for all of them together; then drop them."""
         eager_tasks = self._carriers()
         if not eager_tasks:
             return
