@@ -73,14 +73,18 @@ async def test_programs_meet_in_any_order_and_go_on_meeting_when_the_first_has_g
 
 
 async def test_a_session_that_closes_withdraws_what_it_has_declared_before_zenoh_closes(
-    two: Two, monkeypatch: pytest.MonkeyPatch
+    open_one: Open, here: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Zenoh may connect again while it closes, and would declare there what the session still has."""
+    """Zenoh may connect again while it closes, and would declare there what the session still has.
+
+    The lease is long because a lost connection, too, withdraws what was declared over it.
+    """
 
     async def answer(question: bytes) -> bytes:
         return question
 
-    first, second = two
+    here["lease_s"] = 60.0
+    first, second = await open_one(**here), await open_one(**here)
     there = present(second)
     first.announce("first")
     first.answer("name", answer)
