@@ -154,7 +154,7 @@ class Counter(hfg.Node):
 
     def process(self, value: int) -> int:
         """Count."""
-        self.total += 1
+        self.total = self.total + 1  # not in place: what was set may be an array, which others have as well (T1)
         return self.total
 
     @hfg.slot

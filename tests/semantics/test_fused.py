@@ -44,6 +44,7 @@ FOUND = (  # by the soak
     864005430,
     870000569,
     880001756,
+    880010934,
 )
 ORDERS = 50  # of permitted moves, where several would do
 MOST_MOVES = 1500
