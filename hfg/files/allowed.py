@@ -51,7 +51,7 @@ def installed_packages() -> tuple[str, ...]:
 
 
 class Allowed:
-    """What one file, and those it includes, may import.
+    """The modules that one file, and those it includes, may import.
 
     Args:
       file: the one.
@@ -92,7 +92,7 @@ class Allowed:
         if _is_in(module, _ALWAYS) or _is_in(module, installed_packages()):
             return None
         if not module:
-            return None  # which is told by whoever looks for it
+            return None  # which is reported where it is looked up
         parts = module.split(".")
         if not all(part.isidentifier() for part in parts):
             return f'"{module:.80}" is no name of a module; write "module:name", as in "my_robot.nodes:Camera"'
@@ -106,7 +106,7 @@ class Allowed:
                 importlib.invalidate_caches()
             return None
         if spec is None and folder is None:
-            return None  # there is none, which is told as well
+            return None  # there is none, which is reported as well
         self.wanted[top] = None
         return (
             f'module "{module}" is not one that this file may import, as a file alone must not run code (it would come '

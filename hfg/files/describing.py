@@ -29,7 +29,7 @@ def describe(graph: Graph, beside: Path | None = None, *, same_program: bool = F
 
     Args:
       graph: the graph; it may be running.
-      beside: the file that the document is written to: names of included files are relative to its folder.
+      beside: the file that the document is written to; names of included files are relative to its folder.
       same_program: the document is for another process of the same program, which has its types, too.
 
     Raises:

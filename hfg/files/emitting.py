@@ -27,7 +27,7 @@ def emit(data: Mapping[str, Any]) -> str:
     """Write a mapping as a YAML text.
 
     Raises:
-      TypeError: something in it is no plain data.
+      TypeError: something in it is not plain data.
     """
     return "".join(f"{line}\n" for line in _mapping(data, ""))
 
@@ -43,7 +43,7 @@ def _key(key: object) -> str:
 
 
 def _entry(head: str, value: object, indent: str) -> Iterator[str]:
-    """What begins with `head`, a key or a dash, and holds a value."""
+    """An entry that begins with `head`, a key or a dash, and holds a value."""
     if isinstance(value, Mapping) and value:
         yield head
         yield from _mapping(value, f"{indent}  ")
@@ -62,7 +62,7 @@ def _entry(head: str, value: object, indent: str) -> Iterator[str]:
 
 
 def _item(value: object, indent: str) -> Iterator[str]:
-    """One of a list, over several lines if need be."""
+    """An element of a list, over several lines if necessary."""
     if isinstance(value, Mapping) and value:
         lines = _mapping(value, f"{indent}  ")
         yield f"{indent}- {next(lines)[len(indent) + 2 :]}"

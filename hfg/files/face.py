@@ -91,7 +91,7 @@ def read(path: str | os.PathLike[str]) -> Document:
     """Read what a file says; no node type is imported and no included file read.
 
     Raises:
-      FileError: it is no graph file.
+      FileError: it is not a graph file.
     """
     from hfg.files.findings import Findings
     from hfg.files.reading import read_file

@@ -18,7 +18,7 @@ class FileProblem(Problem, frozen=True):
 
     Attributes:
       file: as it was named.
-      line: from 1; 0 if there is none, as of a graph that cannot be said in a file.
+      line: from 1; 0 if there is none, as for a graph that a file cannot express.
     """
 
     file: str = ""
@@ -40,7 +40,7 @@ class Findings:
         self.problems: list[FileProblem] = []
 
     def add(self, file: str, line: int, path: str, sentence: str) -> None:
-        """Note one; the sentence ends in the remedy, behind the last semicolon."""
+        """Add a finding; its sentence ends with the remedy, after the last semicolon."""
         what, remedy = split(sentence)
         self.problems.append(
             FileProblem(

@@ -30,7 +30,7 @@ _FOR_EVENTS: Final = frozenset(having(EdgeFields, "events"))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _MissingType(NodeType):
-    """What can be told of a type that is not there.
+    """The facts known about a type that is not installed.
 
     Attributes:
       named: its reference.

@@ -2,7 +2,7 @@
 
 Every mapping, list and scalar becomes a `Located`. Tags, which could name Python objects, second documents, keys that
 come twice and aliases that explode are findings. The words are those of YAML 1.2: `no` and `on` are texts, 010 is ten.
-Depends on PyYAML, of which it takes the events alone.
+Depends on PyYAML, but only on its events.
 """
 
 from __future__ import annotations

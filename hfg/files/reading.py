@@ -201,7 +201,7 @@ class _Reading:
         return [value for value in values if value is not _WRONG]
 
     def struct(self, found: Located, cls: type[Any], key: Key, given: dict[str, Any] | None = None) -> Any:
-        if found.value is None:  # nothing is said of it
+        if found.value is None:  # the document has no value for it
             found = Located({}, found.line)
         if not isinstance(found.value, dict):
             name = f'"{key[-1]}"' if key and isinstance(key[-1], str) else _last(key)

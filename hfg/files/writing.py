@@ -28,7 +28,7 @@ def text_of(document: Document) -> str:
     """Write a document as text; the same text for the same document.
 
     Raises:
-      TypeError: a value in it is no plain data.
+      TypeError: a value in it is not plain data.
     """
     said: dict[str, Any] = {"hfg": VERSION, "name": document.name}
     for name in _FIRST[2:]:
@@ -66,7 +66,7 @@ def _plain(value: Any) -> Any:
 
 
 def _struct(value: Any) -> dict[str, Any]:
-    """The fields that are not as they are when nothing is said; those that must be said always."""
+    """Return the fields that differ from their defaults, and those that are always written."""
     defaults = dict(zip(reversed(value.__struct_fields__), reversed(value.__struct_defaults__), strict=False))
     found: dict[str, Any] = {}
     names = value.__struct_fields__

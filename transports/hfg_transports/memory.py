@@ -358,7 +358,7 @@ class MemorySession:
                 self._loop.call_soon(function, *arguments)
             else:
                 self._loop.call_soon_threadsafe(function, *arguments)
-        except RuntimeError:  # the loop is closed: nobody is there any more
+        except RuntimeError:  # the loop is closed, so no one listens any more
             self._closed = True
 
     def call_later(self, delay_s: float, function: Callable[..., object], *arguments: Any) -> None:

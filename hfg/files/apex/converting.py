@@ -52,7 +52,7 @@ class _Level:
     """A graph of the file while it is converted.
 
     Attributes:
-      path: "" or that of the subgraph, with a slash behind it.
+      path: "" or that of the subgraph, followed by a slash.
       names: of the nodes here, by their uuids.
       numbers: of ports that connections use, by node.
     """
@@ -311,7 +311,7 @@ class _Converting:
                 ports[f"{kind}_{number}"] = _ANY
 
     def activity(self, level: _Level, node: ApexNode, box: BoxDocument, told: Converted) -> None:
-        """What its activity does inside comes by slots of its own."""
+        """Its activity acts inside through its own slots."""
         assert node.graph is not None
         name = level.names[node.uuid]
         for event, slot in (("event_activation", "activation"), ("event_deactivation", "deactivation")):
@@ -463,7 +463,7 @@ def _meant(goes: ParameterRule, said: ApexParameter) -> Any:
     """Return the value that is meant: of a set that of its text, because numbers are what its author counted by."""
     if said.kind != "set" or not said.text:
         if goes.values:
-            raise ValueError  # a number alone says nothing
+            raise ValueError  # a bare number says nothing
         return said.value
     if goes.values:
         if said.text not in goes.values:

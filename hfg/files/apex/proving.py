@@ -78,7 +78,7 @@ def _give_signals_values(document: Document, report: ConversionReport, graph: Gr
     """Make values of signals that go into inputs, and say whether there were any.
 
     In CS::APEX such a token carries a message without content, and a node passes it on like any other. A signal without
-    a value is nothing to pass on here: what comes behind the node would be silent.
+    a value cannot be passed on here: the nodes after this one would be silent.
     """
     found = False
     for prefix, box in _boxes(document, ""):

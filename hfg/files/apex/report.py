@@ -12,15 +12,15 @@ State = Literal["mapped", "approximated", "missing"]
 
 
 class Converted(msgspec.Struct, omit_defaults=True):
-    """What became of a node or a connection.
+    """The result for a node or a connection.
 
     Attributes:
       source: its path in the file; of a connection "from -> to".
       kind: of a node, its type there.
       state: "mapped" does the same, "approximated" differs as `why` says, "missing" does nothing here.
-      target: its path here, or the edge; "" if it is in `notes` alone.
+      target: its path here, or the edge; "" if it is only in `notes`.
       type: of a node, its type here.
-      why: what differs, or is not there: a sentence each.
+      why: differences and missing parts, one sentence each.
     """
 
     source: str

@@ -53,7 +53,7 @@ def configuration(settings: Settings, mode: Mode, *, wait_s: float) -> dict[str,
         "transport/unicast/accept_timeout": max(_ACCEPT_MS, int(settings.lease_s * 1000)),
         "transport/link/tx/lease": int(settings.lease_s * 1000),
         "transport/link/tx/queue/size": dict.fromkeys(_PRIORITIES, _BATCHES),
-        # Declarations are not dropped: one to somebody who stands still would hold the loop for five seconds.
+        # Declarations are not dropped: one to a program that hangs would hold the loop for five seconds.
         "transport/link/tx/queue/congestion_control/block/wait_before_close": 1_000_000,
         "transport/link/rx/max_message_size": settings.largest_message + _ROOM,
         "transport/shared_memory/enabled": settings.shared_memory > 0,
@@ -105,7 +105,7 @@ def _is_among_peers(settings: Settings) -> bool:
     All others communicate through agents, which enforce permissions.
 
     With certificates connections among peers would pass by the agent, and so by its access control; and if the agent is
-    on another host, peers behind it cannot be reached.
+    on another host, peers on that host cannot be reached.
     """
     return bool(settings.meet) and settings.tls is None and not _is_elsewhere(settings.connect)
 

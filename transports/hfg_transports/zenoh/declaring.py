@@ -20,7 +20,7 @@ _Some = TypeVar("_Some", bound=Declared)
 
 
 class Declarations:
-    """Keeps what is declared, because Zenoh withdraws a token that nobody holds; from any thread."""
+    """Keeps declarations, because Zenoh withdraws a token without references; from any thread."""
 
     def __init__(self) -> None:
         self._kept: dict[Declared, None] = {}

@@ -45,7 +45,7 @@ class Inbox:
         self._rung = True
         try:
             self._loop.call_soon_threadsafe(self._look)
-        except RuntimeError:  # the loop is closed, nobody will look any more
+        except RuntimeError:  # the loop is closed, so the inbox is not read any more
             self._closed = True
 
     def close(self) -> None:

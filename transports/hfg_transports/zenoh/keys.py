@@ -84,7 +84,7 @@ def tls_of_key(file: str) -> dict[str, Any]:
     told = {"root_ca_certificate_base64": authority.public_bytes(pem)}
     for end in ("listen", "connect"):
         told |= {f"{end}_certificate_base64": certificate.public_bytes(pem), f"{end}_private_key_base64": plain}
-    # Everybody who has the key may listen anywhere, so there is no name to be held against the address.
+    # Every holder of the key may listen anywhere, so there is no name to compare with the address.
     return {name: base64.b64encode(said).decode() for name, said in told.items()} | {
         "enable_mtls": True,
         "verify_name_on_connect": False,

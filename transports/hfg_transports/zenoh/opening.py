@@ -1,6 +1,7 @@
-"""Opens Zenoh's session for the settings; whatever keeps it from that is one sentence with a remedy.
+"""Opens Zenoh's session for the settings; each failure is one clear error with a remedy.
 
-Blocks until a client has found its agent, so it is called in a thread. Stands on settings, config, diagnosing, binding.
+Blocks until a client has found its agent, so it is called in a thread. Depends on settings, config, diagnosing and
+binding.
 """
 
 from __future__ import annotations
@@ -101,7 +102,7 @@ def _exposed_socket(address: str) -> Reason | None:
 
 
 def _wait_for_somebody(session: zenoh.Session, settings: Settings, wait_s: float) -> None:
-    """Peers connect in the background and for ever; at the start they are told when nobody is there."""
+    """Peers connect in the background and forever; at the start they log when no program is there."""
     until = time.monotonic() + wait_s
     while not (session.info.routers_zid() or session.info.peers_zid()):
         if time.monotonic() > until:

@@ -56,7 +56,7 @@ def read_presence_key(prefix: str, key: str) -> tuple[str, str, bytes] | None:
 
 
 class Announcement:
-    """Somebody of this session who is there until it is closed."""
+    """A member of this session that is present until it is closed."""
 
     def __init__(self, undeclare: Callable[[], object]) -> None:
         self._undeclare: Callable[[], object] | None = undeclare

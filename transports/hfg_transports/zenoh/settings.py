@@ -99,7 +99,7 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
       key: a file with a secret that all programs of the realm have, by which both ends prove who they are and which
         encrypts what is sent; "" for none.
       tls: certificates, instead of a key.
-      access: who may do what; None: everybody everything.
+      access: the rights of each name; None: every program may do everything.
       insecure: whether there may be addresses without TLS: any program that can connect there can run code as this
         user.
       largest_message: bytes of header and payload that are sent and received at most.
