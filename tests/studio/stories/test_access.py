@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 
 import pytest
@@ -47,6 +48,10 @@ def test_axe_finds_nothing_serious(story: Story, act: Callable[[Story], None], t
     found = Axe().run(story.page).response["violations"]
     serious = [f"{one['id']}: {one['nodes'][0]['target']}" for one in found if one["impact"] in ("serious", "critical")]
     assert serious == []
+
+
+def test_stories_leave_no_loop_behind_for_other_tests(chromium: object) -> None:
+    assert asyncio.run(asyncio.sleep(0, "done")) == "done"
 
 
 def test_regions_are_reached_by_f6_and_the_canvas_opens_the_palette_by_tab(story: Story) -> None:
