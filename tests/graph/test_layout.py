@@ -372,6 +372,24 @@ def test_places_that_somebody_has_chosen_are_kept_and_others_give_way() -> None:
         assert apart or one.y + one.height <= other.y or other.y + other.height <= one.y
 
 
+def test_who_moves_one_node_moves_no_other() -> None:
+    graph = fetch.build()
+    before = {one.id: (one.x, one.y) for one in lay_out(graph).nodes}
+    places = {"give_up": (before["give_up"][0] - 2000.0, before["give_up"][1] + 400.0)}
+    drawn = lay_out(graph, View(places=places))
+    assert {one.id: (one.x, one.y) for one in drawn.nodes} == before | places
+    assert drawn.width >= max(one.x + one.width for one in drawn.nodes)
+    assert drawn.height >= max(one.y + one.height for one in drawn.nodes)
+
+
+def test_a_node_that_nobody_has_placed_comes_along_with_the_others() -> None:
+    graph = fetch.build()
+    before = {one.id: (one.x, one.y) for one in lay_out(graph).nodes}
+    places = {key: (x + 3000.0, y) for key, (x, y) in before.items() if key != "give_up"}
+    drawn = lay_out(graph, View(places=places))
+    assert {one.id: (one.x, one.y) for one in drawn.nodes} == {key: (x + 3000.0, y) for key, (x, y) in before.items()}
+
+
 def test_a_selection_is_laid_out_around_others_that_stay() -> None:
     graph = fetch.build()
     places = {one.id: (one.x, one.y) for one in lay_out(graph).nodes}
@@ -417,11 +435,12 @@ def test_lines_find_their_way_where_there_is_no_row_and_no_lane(seed: int) -> No
 
 
 @pytest.mark.slow
-def test_300_nodes_take_well_under_a_second_of_processor_time() -> None:
+@pytest.mark.parametrize("places", [{}, {"state_0": (-500.0, 0.0)}], ids=["as laid out", "one of them moved"])
+def test_300_nodes_take_well_under_a_second_of_processor_time(places: dict[str, tuple[float, float]]) -> None:
     graph = large(300)
     took = []
     for _ in range(3):
         begun = time.process_time()
-        lay_out(graph)
+        lay_out(graph, View(places=places))
         took.append(time.process_time() - begun)
     assert median(took) < 1.0

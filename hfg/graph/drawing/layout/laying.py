@@ -47,9 +47,8 @@ def lay(work: Work, view: View, kind: Kind, inner_sizes: Mapping[str, tuple[floa
     if view.places:
         _keep_places(work.things, view)
         _lead(inner, Grid.of_places(work.things))
-    else:
-        work.width = max((one.x + one.width + one.right for one in work.things), default=0.0)
-        work.height = max((one.y + one.height + one.bottom for one in work.things), default=0.0)
+    work.width = max((one.x + one.width + one.right for one in work.things), default=0.0)
+    work.height = max((one.y + one.height + one.bottom for one in work.things), default=0.0)
 
 
 def _jumping(links: Sequence[Link]) -> list[Link]:
@@ -347,7 +346,7 @@ def _is_clear(at: float, spot: Spot, other: Spot) -> bool:
 
 
 def _keep_places(things: Sequence[Thing], view: View) -> None:
-    """Put things where the user wants them; the others come along, and give way to them."""
+    """Put things where the user wants them; the others give way, and come along if they are fewer."""
     kept = [
         one
         for one in things
@@ -355,8 +354,10 @@ def _keep_places(things: Sequence[Thing], view: View) -> None:
     ]
     if not kept:
         return
+    stay = [0.0] * (len(things) - len(kept))
     x, y = (
-        statistics.median(view.places[one.shape.path][axis] - (one.x, one.y)[axis] for one in kept) for axis in (0, 1)
+        statistics.median([*(view.places[one.shape.path][axis] - (one.x, one.y)[axis] for one in kept), *stay])
+        for axis in (0, 1)
     )
     for thing in things:
         thing.x, thing.y = thing.x + round(x), thing.y + round(y)
@@ -369,13 +370,15 @@ def _keep_places(things: Sequence[Thing], view: View) -> None:
             done.append(thing)
 
 
+_STEPS: Final = sorted(
+    ((dx, dy) for dx in range(-40, 41) for dy in range(-40, 41)), key=lambda one: (abs(one[0]) + abs(one[1]), one)
+)
+
+
 def _give_way(thing: Thing, others: Sequence[Thing]) -> None:
     """Move a thing to the nearest place where it lies on no other."""
     x, y = thing.x, thing.y
-    steps = sorted(
-        ((dx, dy) for dx in range(-40, 41) for dy in range(-40, 41)), key=lambda one: (abs(one[0]) + abs(one[1]), one)
-    )
-    for dx, dy in steps:
+    for dx, dy in _STEPS:
         thing.x, thing.y = x + 4 * GRID * dx, y + 4 * GRID * dy
         if not any(_touches(thing, other) for other in others):
             return
