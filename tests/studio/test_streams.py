@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import struct
+import time
 from typing import Any
 
 import numpy as np
@@ -450,7 +451,7 @@ def test_streams_together_have_a_small_share_of_the_loop(monkeypatch: pytest.Mon
         now = [100.0]
         pauses: list[float] = []
         loop = asyncio.get_running_loop()
-        monkeypatch.setattr(loop, "time", lambda: now[0])
+        monkeypatch.setattr(time, "thread_time", lambda: now[0])
         monkeypatch.setattr(loop, "call_later", lambda pause, *_: pauses.append(pause))
 
         def work(_: float) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -60,6 +61,20 @@ class Bench:
         while not self.call(true):
             assert time.monotonic() < end, f"it never held: {what or true}"
             time.sleep(_LOOK_EVERY_S)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let the studio answer nothing for a while, nor the graph go on."""
+        stands, goes_on = threading.Event(), threading.Event()
+
+        def stand() -> None:
+            stands.set()
+            goes_on.wait(patience(10))
+
+        self._loop.call_soon_threadsafe(stand)
+        assert stands.wait(patience(10))
+        yield
+        goes_on.set()
 
     def node(self, path: str) -> Any:
         return self.call(lambda: self.graph[path])

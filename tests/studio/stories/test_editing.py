@@ -205,3 +205,13 @@ def test_two_pages_see_the_same(story: Story) -> None:
     other.press("Control+z")
     expect(story.node("spare")).to_be_visible()
     story.bench.until(lambda: "spare" in story.graph.nodes)
+
+
+def test_a_dropped_wire_is_there_before_the_studio_has_answered(story: Story) -> None:
+    story.hold("numbers.out", "spare.value")
+    with story.bench.held():
+        story.page.mouse.up()
+        expect(story.page.locator('[data-asked="numbers.out -> spare.value"]')).to_have_count(1)
+    expect(story.page.locator('[data-edges*="numbers.out -> spare.value"]')).to_have_count(1)
+    expect(story.page.locator("[data-asked]")).to_have_count(0)
+    assert "numbers.out -> spare.value" in edges_of(story)

@@ -146,3 +146,26 @@ def test_what_one_chooses_in_a_level_takes_the_place_of_the_choice_outside(story
     story.node("errand/there").wait_for()
     story.select("errand/there")
     expect(story.page.locator("#side h2").first).to_have_text("there")
+
+
+def test_who_comes_back_to_a_level_does_not_wait_for_the_studio(story: Story) -> None:
+    story.select("errand")
+    story.press("Enter")
+    story.node("errand/there").wait_for()
+    with story.bench.held():
+        story.press("Backspace")
+        expect(story.node("numbers")).to_be_visible()
+        story.press("Enter")
+        expect(story.node("errand/there")).to_be_visible()
+
+
+def test_a_node_that_lies_far_away_is_a_block_and_has_its_ports_again_when_one_comes_near(story: Story) -> None:
+    story.page.mouse.move(*story.empty_place())
+    for _ in range(3):
+        story.page.mouse.wheel(0, 600)
+    expect(story.page.locator("#canvas")).to_have_class(re.compile(r"\bfar\b"))
+    expect(story.node("numbers")).to_be_visible()
+    expect(story.port("numbers.out")).to_have_count(0)
+    story.page.get_by_role("button", name="Zoom to 100 %").click()
+    story.press("Home")
+    expect(story.port("numbers.out")).to_be_visible()

@@ -3,6 +3,7 @@ import { Background, BackgroundVariant, ReactFlow, ReactFlowProvider, ViewportPo
 import { useMemo, useRef } from "react";
 import { change, layoutKey, useStudio } from "../state/studio";
 import { enter } from "../state/actions";
+import { AskedWires } from "./AskedWires";
 import { FarOverlay } from "./FarOverlay";
 import { MovedWires } from "./MovedWires";
 import { NodeView } from "./NodeView";
@@ -35,7 +36,6 @@ function Inner() {
   const view = useView(root, layout);
   const events = useCanvasEvents(spots, layout);
   const classes = [view.level, wiring && "wiring", layout?.view === "activity" && "view-activity"];
-  const rect = root.current?.getBoundingClientRect();
   return (
     <main id="canvas" ref={root} className={classes.filter(Boolean).join(" ")} aria-label="Graph" tabIndex={-1} {...events}>
       <ReactFlow
@@ -76,6 +76,7 @@ function Inner() {
           <ViewportPortal>
             <div className="under">
               <Wires layout={layout} moved={moved} />
+              <AskedWires layout={layout} spots={spots} />
               <MovedWires layout={layout} nodes={nodes} moved={moved} />
             </div>
             <Tags layout={layout} />
@@ -84,10 +85,10 @@ function Inner() {
         {layout && view.level === "far" && <FarOverlay layout={layout} />}
         {view.partly && <Mini />}
       </ReactFlow>
-      {rect && <WireDrag spots={spots} offset={rect} />}
+      <WireDrag spots={spots} />
       <ValueTip />
       {layout?.view === "activity" && <ActivityLegend hidden={layout.hidden} />}
-      <Zoomer zoom={view.zoom} showAll={view.showAll} />
+      <Zoomer showAll={view.showAll} />
       {layout?.nodes.length === 0 && <p className="nothing-here">Nothing here yet. Press Tab to add a node, or drop a file.</p>}
     </main>
   );

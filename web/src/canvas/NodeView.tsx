@@ -1,12 +1,13 @@
 import type { Node, NodeProps } from "@xyflow/react";
 import { memo } from "react";
-import type { NodeBox } from "../protocol/types";
+import type { NodeBox, NodeRecord } from "../protocol/types";
 import { activeInside, groupClass, limitOf } from "../state/looking";
 import { isInside } from "../state/paths";
 import { useStudio } from "../state/studio";
 import { MeasureRow } from "./MeasureRow";
 import { NodePorts } from "./NodePorts";
 import { NodeTitle } from "./NodeTitle";
+import { useZoom } from "./useView";
 import { WhereLine } from "./WhereLine";
 
 export type HfgNode = Node<{ box: NodeBox; plain: boolean }, "hfg">;
@@ -34,6 +35,8 @@ function useLook(path: string) {
   return { active: active || inside !== null, inside, failed, selected, within, brk };
 }
 
+type Look = ReturnType<typeof useLook>;
+
 function hasError(problems: Record<string, { path: string; severity: string; source: string }>, path: string): boolean {
   return Object.values(problems).some((one) => one.severity === "error" && one.path === path && one.source === "run");
 }
@@ -44,7 +47,6 @@ function NodeViewPlain({ data }: NodeProps<HfgNode>) {
   const record = useStudio((s) => s.tables.nodes[path]);
   const group = useStudio((s) => groupClass(s.tables, record?.group ?? box.group));
   const look = useLook(path);
-  const rows = rowsOf(box);
   const limit = limitOf(record);
   const classes = [
     "node",
@@ -59,20 +61,32 @@ function NodeViewPlain({ data }: NodeProps<HfgNode>) {
     record?.enabled === false && "off",
     record?.missing && "missing",
   ];
+  const far = useZoom((s) => s.level === "far");
   const label = `${box.name}, ${look.active ? "active, " : ""}${box.type_name}, group ${record?.group ?? box.group}`;
   return (
     <>
       <div className={classes.filter(Boolean).join(" ")} data-node={path} role="img" aria-label={label}>
-        <i className="stripe" />
-        {look.brk && <i className={look.brk.holds ? "brk holds" : "brk"} title="The run pauses here (F9)" />}
-        <NodeTitle box={box} record={record} top={plain && !look.inside ? box.height / 2 - 10 : rows.title} plain={plain} />
-        {look.inside !== null ? (
-          <WhereLine path={path} inside={look.inside} top={rows.measure} />
-        ) : (
-          !plain && <MeasureRow box={box} top={rows.measure} missing={record?.missing ?? ""} failed={look.failed} />
-        )}
+        {!far && <NodeInside box={box} look={look} plain={plain} record={record} />}
       </div>
-      {!plain && <NodePorts box={box} path={path} active={look.active} limit={limit} />}
+      {!plain && !far && <NodePorts box={box} path={path} active={look.active} limit={limit} />}
+    </>
+  );
+}
+
+/** What one sees of a node that is not far away. */
+function NodeInside({ box, look, plain, record }: { box: NodeBox; look: Look; plain: boolean; record: NodeRecord | undefined }) {
+  const rows = rowsOf(box);
+  const top = plain && !look.inside ? box.height / 2 - 10 : rows.title;
+  return (
+    <>
+      <i className="stripe" />
+      {look.brk && <i className={look.brk.holds ? "brk holds" : "brk"} title="The run pauses here (F9)" />}
+      <NodeTitle box={box} record={record} top={top} plain={plain} />
+      {look.inside !== null ? (
+        <WhereLine path={box.id} inside={look.inside} top={rows.measure} />
+      ) : (
+        !plain && <MeasureRow box={box} top={rows.measure} missing={record?.missing ?? ""} failed={look.failed} />
+      )}
     </>
   );
 }

@@ -8,7 +8,7 @@ import { loose } from "./geometry";
 import type { Spot } from "./wiring";
 
 /** The line that is drawn by hand, and what would become of it. */
-export function WireDrag({ spots, offset }: { spots: Map<string, Spot>; offset: { x: number; y: number } }) {
+export function WireDrag({ spots }: { spots: Map<string, Spot> }) {
   const wire = useStudio((s) => s.wire);
   if (!wire) return null;
   const from = spots.get(wire.from);
@@ -17,6 +17,7 @@ export function WireDrag({ spots, offset }: { spots: Map<string, Spot>; offset: 
   const start: [number, number] = from ? [from.x, from.y] : [wire.point.x, wire.point.y];
   const end: [number, number] = over ? [over.x, over.y] : [wire.point.x, wire.point.y];
   const upright = from?.kind === "event" || from?.kind === "slot" || from?.kind === "timeout";
+  const offset = document.getElementById("canvas")?.getBoundingClientRect() ?? new DOMRect();
   const [a, b] = isSource(wire.from) ? [start, end] : [end, start];
   const refused = fit?.fit === "refused";
   return (

@@ -1,19 +1,20 @@
-import { MiniMap, useReactFlow } from "@xyflow/react";
+import { MiniMap, useReactFlow, useStore } from "@xyflow/react";
 import { useMemo } from "react";
 import { arrange } from "../state/actions";
 import { studio, useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
 import type { HfgNode } from "./NodeView";
 
-export function Zoomer({ zoom, showAll }: { zoom: number; showAll: () => void }) {
+export function Zoomer({ showAll }: { showAll: () => void }) {
   const flow = useReactFlow();
+  const percent = useStore((s) => Math.round(s.transform[2] * 100));
   return (
     <div className="zoomer">
       <button type="button" className="btn" aria-label="Zoom out" onClick={() => void flow.zoomOut({ duration: 120 })}>
         <Icon name="minus" />
       </button>
       <button type="button" className="btn num" style={{ minWidth: 48 }} aria-label="Zoom to 100 %" onClick={() => void flow.zoomTo(1, { duration: 120 })}>
-        {Math.round(zoom * 100)} %
+        {percent} %
       </button>
       <button type="button" className="btn" aria-label="Zoom in" onClick={() => void flow.zoomIn({ duration: 120 })}>
         <Icon name="plus" />

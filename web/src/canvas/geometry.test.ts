@@ -1,5 +1,6 @@
+import type { LayoutRecord } from "../protocol/types";
 import { describe, expect, it } from "vitest";
-import { allInView, firstView, rounded, tipOf, zoomOf } from "./geometry";
+import { allInView, boundsOf, firstView, rounded, tipOf, zoomOf } from "./geometry";
 
 describe("lines", () => {
   it("have rounded corners that are no larger than half of a side", () => {
@@ -17,18 +18,26 @@ describe("lines", () => {
   });
 });
 
+const box = (width: number, height: number) => ({ x: 0, y: 0, width, height });
+
 describe("the first view of a level", () => {
   it("shows all of it where one can read it then", () => {
-    expect(firstView(1112, 724, 1076, 643).zoom).toBeCloseTo(0.89, 2);
+    expect(firstView(box(1112, 724), 1076, 643).zoom).toBeCloseTo(0.89, 2);
   });
   it("shows the upper end of a high level, and not less of its width", () => {
-    const view = firstView(880, 1200, 1076, 643);
+    const view = firstView(box(880, 1200), 1076, 643);
     expect(view.zoom).toBeCloseTo(0.89, 2);
     expect(view.y).toBe(24);
   });
   it("never enlarges", () => {
-    expect(firstView(100, 100, 1076, 643).zoom).toBe(1);
-    expect(allInView(100, 100, 1076, 643).zoom).toBe(1);
+    expect(firstView(box(100, 100), 1076, 643).zoom).toBe(1);
+    expect(allInView(box(100, 100), 1076, 643).zoom).toBe(1);
+  });
+  it("shows what somebody has put to the left of the origin", () => {
+    const nodes = [{ x: -2000, y: 0, width: 200, height: 72 }, { x: 0, y: 0, width: 200, height: 72 }] as LayoutRecord["nodes"];
+    const { x, zoom } = allInView(boundsOf({ nodes, lines: [] }), 1076, 643);
+    expect(-2000 * zoom + x).toBeCloseTo(24);
+    expect(200 * zoom + x).toBeCloseTo(1076 - 24);
   });
   it("is far, middle or near", () => {
     expect([0.44, 0.45, 1.25, 1.26].map(zoomOf)).toEqual(["far", "middle", "middle", "near"]);

@@ -1,4 +1,4 @@
-import type { Point } from "../protocol/types";
+import type { LayoutRecord, Point } from "../protocol/types";
 
 /** The path of corners, each rounded as far as its two sides allow. */
 export function rounded(points: readonly Point[], radius = 7): string {
@@ -43,17 +43,41 @@ export function loose(from: Point, to: Point, upright: boolean): string {
 export type Zoom = "far" | "middle" | "near";
 export const zoomOf = (z: number): Zoom => (z < 0.45 ? "far" : z <= 1.25 ? "middle" : "near");
 
-/** How a level is shown first: all of it if one can read it then, else its upper end at a size that one can read. */
-export function firstView(width: number, height: number, canvasWidth: number, canvasHeight: number) {
-  const room = 48;
-  const wide = (canvasWidth - room) / Math.max(1, width);
-  const all = Math.min(wide, (canvasHeight - room) / Math.max(1, height));
-  const zoom = Math.max(0.08, Math.min(1, Math.max(all, Math.min(wide, 0.89))));
-  const y = height * zoom > canvasHeight - room ? 24 : (canvasHeight - height * zoom) / 2;
-  return { x: (canvasWidth - width * zoom) / 2, y, zoom };
+export interface Box {
+  x: number;
+  y: number;
+  width: number;
+  height: number;
 }
 
-export function allInView(width: number, height: number, canvasWidth: number, canvasHeight: number) {
-  const zoom = Math.max(0.08, Math.min(1, (canvasWidth - 48) / Math.max(1, width), (canvasHeight - 48) / Math.max(1, height)));
-  return { x: (canvasWidth - width * zoom) / 2, y: (canvasHeight - height * zoom) / 2, zoom };
+/** What a layout takes up: people put nodes anywhere, also to the left of where it begins. */
+export function boundsOf({ nodes, lines }: Pick<LayoutRecord, "nodes" | "lines">): Box {
+  let [left, top, right, bottom] = [Infinity, Infinity, -Infinity, -Infinity];
+  const take = (x: number, y: number, width = 0, height = 0) => {
+    left = Math.min(left, x);
+    top = Math.min(top, y);
+    right = Math.max(right, x + width);
+    bottom = Math.max(bottom, y + height);
+  };
+  for (const one of nodes) take(one.x, one.y, one.width, one.height);
+  for (const { points, tag } of lines) {
+    for (const [x, y] of points) take(x, y);
+    if (tag) take(tag.x, tag.y, tag.width, tag.height);
+  }
+  return left === Infinity ? { x: 0, y: 0, width: 0, height: 0 } : { x: left, y: top, width: right - left, height: bottom - top };
+}
+
+/** How a level is shown first: all of it if one can read it then, else its upper end at a size that one can read. */
+export function firstView(box: Box, canvasWidth: number, canvasHeight: number) {
+  const room = 48;
+  const wide = (canvasWidth - room) / Math.max(1, box.width);
+  const all = Math.min(wide, (canvasHeight - room) / Math.max(1, box.height));
+  const zoom = Math.max(0.08, Math.min(1, Math.max(all, Math.min(wide, 0.89))));
+  const top = box.height * zoom > canvasHeight - room ? 24 : (canvasHeight - box.height * zoom) / 2;
+  return { x: (canvasWidth - box.width * zoom) / 2 - box.x * zoom, y: top - box.y * zoom, zoom };
+}
+
+export function allInView(box: Box, canvasWidth: number, canvasHeight: number) {
+  const zoom = Math.max(0.08, Math.min(1, (canvasWidth - 48) / Math.max(1, box.width), (canvasHeight - 48) / Math.max(1, box.height)));
+  return { x: (canvasWidth - box.width * zoom) / 2 - box.x * zoom, y: (canvasHeight - box.height * zoom) / 2 - box.y * zoom, zoom };
 }

@@ -4,7 +4,7 @@ import type { LayoutRecord } from "../protocol/types";
 import { change, studio } from "../state/studio";
 import { select } from "../state/actions";
 import { hideTip, showTip } from "./tips";
-import { beginWire, dropWire, endWire, nearest, openPalette, type Spot } from "./wiring";
+import { beginWire, dropWire, endWire, nearest, openPalette, restOn, type Spot } from "./wiring";
 
 /** What the mouse does on the canvas besides what React Flow does: wires, menus, the palette, values at the mouse. */
 export function useCanvasEvents(spots: Map<string, Spot>, layout: LayoutRecord | undefined) {
@@ -79,8 +79,9 @@ export function useCanvasEvents(spots: Map<string, Spot>, layout: LayoutRecord |
       const target = event.target as Element;
       highlight(target.closest<HTMLElement>("[data-node]")?.dataset.node);
       if (studio().wire || event.buttons !== 0) return;
-      const port = target.closest<HTMLElement>("[data-port]")?.dataset.port;
-      const path = port ?? edgeAt(target);
+      const element = target.closest<HTMLElement>("[data-port]");
+      restOn(element?.dataset.port ?? "", element?.dataset.kind ?? "");
+      const path = element?.dataset.port ?? edgeAt(target);
       if (path) showTip(path, event.clientX, event.clientY);
       else hideTip();
     },

@@ -1,8 +1,12 @@
 import { useReactFlow, type Viewport } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useRef, useState } from "react";
+import { create } from "zustand";
 import type { LayoutRecord } from "../protocol/types";
 import { studio } from "../state/studio";
-import { allInView, firstView, type Zoom, zoomOf } from "./geometry";
+import { allInView, boundsOf, firstView, type Zoom, zoomOf } from "./geometry";
+
+/** Which of the three ways to draw the zoom asks for. */
+export const useZoom = create<{ level: Zoom }>()(() => ({ level: "middle" }));
 
 const kept = new Map<string, Viewport>();
 const still = window.matchMedia("(prefers-reduced-motion: reduce)");
@@ -10,21 +14,23 @@ const still = window.matchMedia("(prefers-reduced-motion: reduce)");
 /** Where one looks: place and zoom of each level are kept; which of the three ways to draw follows the zoom. */
 export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecord | undefined) {
   const flow = useReactFlow();
-  const [level, setLevel] = useState<Zoom>("middle");
-  const [zoom, setZoom] = useState(1);
+  const level = useZoom((s) => s.level);
   const [partly, setPartly] = useState(false);
   const shown = useRef<string | null>(null);
+  const settled = useRef(0);
   const current = useRef(layout);
   current.current = layout;
 
   const settle = useCallback(
     (view: Viewport) => {
       const element = root.current;
-      if (!element) return;
-      element.style.setProperty("--z", String(view.zoom));
-      element.style.setProperty("--inv", String(1 / view.zoom));
-      setLevel(zoomOf(view.zoom));
-      setZoom(view.zoom);
+      if (!element || settled.current === view.zoom) return;
+      settled.current = view.zoom;
+      const next = zoomOf(view.zoom);
+      // A variable is computed anew for all that is below, so it is set where and when something depends on it only.
+      if (next === "near") element.style.setProperty("--inv", String(1 / view.zoom));
+      if (next === "far") element.querySelector<HTMLElement>(".under")?.style.setProperty("--z", String(view.zoom));
+      useZoom.setState({ level: next });
     },
     [root],
   );
@@ -41,7 +47,7 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
   const showAll = useCallback(() => {
     const element = root.current;
     if (!element || !current.current) return;
-    const view = allInView(current.current.width, current.current.height, element.clientWidth, element.clientHeight);
+    const view = allInView(boundsOf(current.current), element.clientWidth, element.clientHeight);
     void flow.setViewport(view, { duration: still.matches ? 0 : 200 });
   }, [flow, root]);
 
@@ -49,7 +55,7 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
     const element = root.current;
     if (!layout || !element || shown.current === key(layout)) return;
     shown.current = key(layout);
-    const view = kept.get(key(layout)) ?? firstView(layout.width, layout.height, element.clientWidth, element.clientHeight);
+    const view = kept.get(key(layout)) ?? firstView(boundsOf(layout), element.clientWidth, element.clientHeight);
     void flow.setViewport(view);
     settle(view);
     setPartly(isPartly(layout, view, element));
@@ -78,14 +84,15 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
     };
   }, [flow, root, showAll]);
 
-  return { level, zoom, partly, onMove, onMoveEnd, showAll };
+  return { level, partly, onMove, onMoveEnd, showAll };
 }
 
 const key = (layout: LayoutRecord | undefined): string => (layout ? `${studio().hello?.name}:${studio().level}:${layout.view}` : "");
 
 function isPartly(layout: LayoutRecord | undefined, view: Viewport, element: HTMLElement | null): boolean {
   if (!layout || !element) return false;
-  const [left, top] = [view.x, view.y];
-  const [right, bottom] = [view.x + layout.width * view.zoom, view.y + layout.height * view.zoom];
+  const box = boundsOf(layout);
+  const [left, top] = [view.x + box.x * view.zoom, view.y + box.y * view.zoom];
+  const [right, bottom] = [left + box.width * view.zoom, top + box.height * view.zoom];
   return left < -40 || top < -40 || right > element.clientWidth + 40 || bottom > element.clientHeight + 40;
 }

@@ -1,6 +1,6 @@
 import type { Fit, LayoutRecord, PortKind, Targets } from "../protocol/types";
 import { connect, disconnect, isSource, locked, question, reconnect, toast } from "../state/actions";
-import { endsOf, nodeOf } from "../state/paths";
+import { edgeKey, endsOf, nodeOf } from "../state/paths";
 import { change, studio } from "../state/studio";
 
 export interface Spot {
@@ -44,6 +44,44 @@ function movedEdge(port: string, kind: string): string {
   return found ?? "";
 }
 
+interface Known {
+  from: string;
+  moving: string;
+  edges: unknown;
+  until: number;
+  targets: Promise<Targets>;
+}
+
+/** What an edge from the port under the mouse may lead to. */
+let known: Known | null = null;
+const KNOWN_MS = 3000;
+
+function targetsOf(from: string, moving: string): Promise<Targets> {
+  const { edges } = studio().tables;
+  const now = performance.now();
+  if (known?.from === from && known.moving === moving && known.edges === edges && now < known.until) return known.targets;
+  const targets = question<Targets>("targets", { port: from, moving });
+  known = { from, moving, edges, until: now + KNOWN_MS, targets };
+  targets.catch(() => (known = null));
+  return targets;
+}
+
+const REST_MS = 60;
+let resting = 0;
+
+/** The mouse rests on a port: who presses next sees the targets at once. */
+export function restOn(port: string, kind: string): void {
+  clearTimeout(resting);
+  if (port === "" || locked() !== "" || studio().wire) return;
+  resting = window.setTimeout(() => void targetsOf(...beginOf(port, kind)).catch(() => undefined), REST_MS);
+}
+
+/** Where a wire from a port begins, and which edge it moves. */
+function beginOf(port: string, kind: string): [from: string, moving: string] {
+  const moving = movedEdge(port, kind);
+  return [moving === "" ? port : endsOf(moving)[0], moving];
+}
+
 /** Press on a port: what an edge may lead to comes from the studio, once, with the reasons for all refusals. */
 export async function beginWire(port: string, kind: string, at: { x: number; y: number }, screen: { x: number; y: number }) {
   const why = locked();
@@ -51,11 +89,10 @@ export async function beginWire(port: string, kind: string, at: { x: number; y: 
     toast(why, { kind: "warn" });
     return;
   }
-  const moving = movedEdge(port, kind);
-  const from = moving === "" ? port : endsOf(moving)[0];
+  const [from, moving] = beginOf(port, kind);
   change({ wire: { from, moving, targets: null, over: null, point: at, screen, active: false } });
   try {
-    const targets = await question<Targets>("targets", { port: from, moving });
+    const targets = await targetsOf(from, moving);
     const wire = studio().wire;
     if (wire?.from !== from) return;
     change({ wire: { ...wire, targets } });
@@ -113,8 +150,15 @@ export async function dropWire(place: { x: number; y: number }): Promise<void> {
     return;
   }
   const [source, target] = isSource(wire.from) ? [wire.from, wire.over] : [wire.over, wire.from];
-  if (wire.moving !== "") await reconnect(wire.moving, source, target);
-  else await connect(source, target, wire.active);
+  const key = edgeKey(source, target);
+  change({ asked: [...studio().asked, key] });
+  const done = await (wire.moving !== "" ? reconnect(wire.moving, source, target) : connect(source, target, wire.active));
+  if (!done) forgetAsked([key]);
+}
+
+/** The studio has drawn these edges, or refused them. */
+export function forgetAsked(keys: readonly string[]): void {
+  change({ asked: studio().asked.filter((one) => !keys.includes(one)) });
 }
 
 export function openPalette(port: string, screen: { x: number; y: number }, place: { x: number; y: number }, words = ""): void {

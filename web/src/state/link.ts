@@ -12,7 +12,7 @@ export const socket = new Socket(address(), {
   message: heard,
   opened() {
     change({ phase: "open", age: 0, ageSeconds: 0, wire: null });
-    opened = null;
+    opened = [];
     showLevel();
   },
   closed(code, reason) {
@@ -27,7 +27,9 @@ export const socket = new Socket(address(), {
 });
 
 let boot: string | null = null;
-let opened: { path: string; view: string } | null = null;
+/** Levels that the studio lays out for this page, the one that is shown last: who comes back finds them as they are. */
+let opened: { path: string; view: string }[] = [];
+const KEPT_LEVELS = 8;
 
 function address(): string {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
@@ -60,9 +62,11 @@ function keepLevel(): void {
 export function showLevel(): void {
   const state = studio();
   const wanted = { path: state.level, view: state.views[state.level] ?? "" };
-  if (opened && opened.path === wanted.path && opened.view === wanted.view) return;
-  if (opened) socket.send({ t: "level", ...opened, open: false });
-  if (socket.send({ t: "level", ...wanted, open: true })) opened = wanted;
+  const same = (one: typeof wanted) => one.path === wanted.path && one.view === wanted.view;
+  if (opened.length > 0 && same(opened.at(-1)!)) return;
+  if (!opened.some(same) && !socket.send({ t: "level", ...wanted, open: true })) return;
+  opened = [...opened.filter((one) => !same(one)), wanted];
+  for (const one of opened.splice(0, opened.length - KEPT_LEVELS)) socket.send({ t: "level", ...one, open: false });
 }
 
 /** Old data looks old: after one second without a word the dot is grey, after three the picture is. */

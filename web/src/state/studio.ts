@@ -62,6 +62,8 @@ export interface Studio {
   palette: PaletteAt | null;
   menu: { x: number; y: number; path: string; kind: "node" | "edge" | "canvas" } | null;
   wire: WireDrag | null;
+  /** Edges that were asked for, until the studio has drawn or refused them. */
+  asked: readonly string[];
   /** The edge that a dragged node would be put on. */
   insertAt: string | null;
   renaming: string | null;
@@ -104,6 +106,7 @@ export const useStudio = create<Studio>()(() => ({
   palette: null,
   menu: null,
   wire: null,
+  asked: [],
   insertAt: null,
   renaming: null,
   side: window.innerWidth > 1100,
