@@ -28,6 +28,7 @@ SUITES = (
     "bench_kinds",
     "bench_live",
     "bench_observers",
+    "bench_robot",
     "bench_shape",
     "bench_start",
     "bench_threads",

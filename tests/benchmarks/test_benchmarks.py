@@ -9,11 +9,22 @@ import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import pytest
 
-from benchmarks import bench_goals, bench_links, bench_peers, bench_start, figures, page, profile_hop, threaded
+from benchmarks import (
+    bench_goals,
+    bench_links,
+    bench_peers,
+    bench_robot,
+    bench_start,
+    figures,
+    page,
+    profile_hop,
+    threaded,
+)
 from benchmarks.__main__ import SUITES
 from benchmarks.goals import Goal, Side, judge, verdicts
 from benchmarks.measure import BEFORE, ROOT, Record, measure, one, read, write
@@ -21,6 +32,7 @@ from benchmarks.meters import Arrivals, Laps
 from benchmarks.nodes import through
 from benchmarks.ours import Kind, run
 from benchmarks.parcels import Job, Post
+from benchmarks.sampler import Sampler
 from benchmarks.works import WORKS
 
 MODULES = {name: importlib.import_module(f"benchmarks.{name}") for name in (*SUITES, "bench_peers", "bench_goals")}
@@ -40,7 +52,9 @@ def cases() -> Iterator[tuple[str, str]]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("suite", "case"), list(cases()))
 def test_every_case_runs_at_a_tiny_size(suite: str, case: str) -> None:
-    figures = MODULES[suite].CASES[case].run({"bench_threads": 2, "bench_start": 1}.get(suite, TOKENS))
+    figures = (
+        MODULES[suite].CASES[case].run({"bench_threads": 2, "bench_start": 1, "bench_robot": 6}.get(suite, TOKENS))
+    )
     values = list(figures.values()) if isinstance(figures, dict) else [figures]
     assert values
     assert all(math.isfinite(value) for value in values)
@@ -57,7 +71,7 @@ def test_every_peer_takes_part_or_is_named_as_missing() -> None:
         assert (peer in rows) != (f"{peer} is not installed" in bench_peers.MISSING), peer
 
 
-@pytest.mark.parametrize("suite", [bench_goals, bench_links, bench_start])
+@pytest.mark.parametrize("suite", [bench_goals, bench_links, bench_robot, bench_start])
 def test_every_goal_has_its_cases_or_the_reason_why_not(suite: Any) -> None:
     assert suite.GOALS
     for goal in suite.GOALS:
@@ -259,6 +273,34 @@ def test_samples_are_sorted_into_parts_by_their_innermost_line() -> None:
 def test_a_profile_that_met_nothing_is_an_error() -> None:
     with pytest.raises(RuntimeError, match=r"Engine\._drain"):
         profile_hop.shares(["<module> (bench.py:1) 100"])
+
+
+@pytest.mark.parametrize(
+    ("files", "share"),
+    [
+        (["/there/hfg/engine/rules/firing.py"], 100),
+        (["<hfg region 1> from chain/first"], 100),
+        (["/there/hfg/engine/rules/firing.py", "/there/examples/robot.py"], 0),
+        (["<hfg region 1> from chain/first", "/there/hfg/nodes/cv/_blur.py", "/lib/numpy/core.py"], 0),
+        (["/there/examples/robot.py", "/there/hfg/ports/ports.py", "/lib/asyncio/events.py"], 100),
+    ],
+)
+def test_time_belongs_to_the_innermost_lines_that_are_of_the_framework_or_of_a_node(
+    files: list[str], share: float
+) -> None:
+    """Each file calls the next one, and the last one is busy for a while."""
+    inner: Any = None
+    for file in reversed(files):
+        names: dict[str, Any] = {"inner": inner, "process_time": process_time}
+        busy = "    until = process_time() + 0.03\n    while process_time() < until: pass"
+        exec(compile(f"def call():\n{'    inner()' if inner else busy}", file, "exec"), names)
+        inner = names["call"]
+    sampler = Sampler()
+    with sampler:
+        sampler.begin()
+        inner()
+    assert sampler.share() == pytest.approx(share, abs=10)  # the calls that lead there take some time, too
+    assert 0.005 < sampler.seconds < 0.2
 
 
 def test_figures_of_a_busy_machine_say_so() -> None:
