@@ -7,18 +7,18 @@ library.
 from __future__ import annotations
 
 import errno
-import itertools
 import os
+import secrets
 import stat
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, BinaryIO, Final, Literal
 
-__all__ = ["GrowingFile", "need_writable", "write_whole"]
+__all__ = ["GrowingFile", "need_writable", "read_plain", "write_in_place", "write_whole"]
 
-_numbers: Final = itertools.count()
 _HELD_BYTES: Final = 64 * 1024
+_PERMISSIONS: Final = 0o777  # never those by which a file runs as its owner
 
 
 def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool = True) -> None:
@@ -38,17 +38,17 @@ def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool
     if not overwrite and target.exists():
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
     if _is_no_file(target):
-        with target.open("wb") as file:
+        with _open(target, "wb") as file:
             write(file)
         return
-    beside = target.with_name(f".hfg-{os.getpid()}-{next(_numbers)}.part")
+    beside = target.with_name(f".hfg-{secrets.token_hex(8)}.part")  # a name that cannot be taken before
     try:
         with beside.open("xb") as file:
             write(file)
             file.flush()
             os.fsync(file.fileno())
         with suppress(OSError):
-            beside.chmod(target.stat().st_mode)
+            beside.chmod(target.stat().st_mode & _PERMISSIONS)
         beside.replace(target)
     except BaseException:
         with suppress(OSError):
@@ -57,27 +57,77 @@ def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool
     _keep_the_name(target)
 
 
+def write_in_place(path: Path) -> BinaryIO:
+    """Open a file to be written from its beginning, and empty it.
+
+    Raises:
+      OSError: it cannot be opened.
+    """
+    return _open(_target(path), "wb")
+
+
 def need_writable(path: Path) -> None:
     """Check that a file could be written here. Leave no file.
 
     Raises:
       OSError: it could not.
     """
-    was_there = path.exists()
-    with path.open("ab"):
+    target = _target(path)
+    if _is_no_file(target):
+        return
+    was_there = target.exists()
+    with _open(target, "ab"):
         pass
     if not was_there:
-        path.unlink()
+        target.unlink()
+
+
+def read_plain(path: Path, most: int) -> bytes:
+    """Read a file of which another user could have made something else: a pipe would wait forever, a device not end.
+
+    Args:
+      path: the file.
+      most: the most bytes to read.
+
+    Raises:
+      OSError: it cannot be read, or is not a plain file.
+    """
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+    with os.fdopen(os.open(path, flags), "rb") as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise OSError(errno.EINVAL, "it is not a plain file", str(path))
+        return file.read(most)
+
+
+def _open(target: Path, mode: Literal["ab", "wb"], buffering: int = -1) -> BinaryIO:
+    """Open what was checked: if its last part has become a link meanwhile, this fails."""
+    links = getattr(os, "O_NOFOLLOW", 0)
+    return open(target, mode, buffering, opener=lambda path, flags: os.open(path, flags | links, 0o666))
 
 
 def _target(path: Path) -> Path:
-    if path.is_symlink() and hasattr(os, "geteuid") and path.lstat().st_uid not in (0, os.geteuid()):
-        # in a folder that others may write to, anyone can lead us to a file of ours
-        raise PermissionError(errno.EPERM, "a symbolic link of another user is in its place; remove it", str(path))
+    _need_trusted(path)
     target = path.resolve() if path.is_symlink() else path
+    if target != path:
+        _need_trusted(target)
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     return target
+
+
+def _need_trusted(path: Path) -> None:
+    """Refuse a link or pipe of another user: in a folder that others may write to, it leads to a file of ours, or him.
+
+    Raises:
+      OSError: it is one.
+    """
+    try:
+        there = path.lstat()
+    except FileNotFoundError:
+        return
+    for is_one, what in ((stat.S_ISLNK, "symbolic link"), (stat.S_ISFIFO, "pipe")):
+        if is_one(there.st_mode) and hasattr(os, "geteuid") and there.st_uid not in (0, os.geteuid()):
+            raise PermissionError(errno.EPERM, f"a {what} of another user is in its place; remove it", str(path))
 
 
 def _is_no_file(path: Path) -> bool:
@@ -146,7 +196,7 @@ class GrowingFile:
         self._target = _target(path)
         in_place = append or _is_no_file(self._target)
         self.place = self._target if in_place else self._target.with_name(f"{self._target.name}.part")
-        self._file = self.place.open("ab" if append else "wb", buffering=0) if in_place else _own_part(self.place)
+        self._file = _open(self.place, "ab" if append else "wb", 0) if in_place else _own_part(self.place)
         self._at_once = at_once
         self._held: list[bytes] = []
         self._held_bytes = 0
@@ -206,6 +256,6 @@ class GrowingFile:
             self._file.close()
         if self.place != self._target:
             with suppress(OSError):
-                self.place.chmod(self._target.stat().st_mode)
+                self.place.chmod(self._target.stat().st_mode & _PERMISSIONS)
             self.place.replace(self._target)
             _keep_the_name(self._target)

@@ -100,4 +100,4 @@ def write_text(text: str, path: Path) -> None:
     Raises:
       OSError: it cannot be written.
     """
-    write_whole(path.resolve(), lambda stream: stream.write(text.encode()))
+    write_whole(path, lambda stream: stream.write(text.encode()))

@@ -7,6 +7,7 @@ were saved before, so undoing one of them is written as the whole graph. Depends
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -74,11 +75,11 @@ class Journal:
         return (steps, there.st_mtime) if steps else None
 
     def _lines(self) -> list[_Line]:
-        number = os.open(self.path, os.O_RDONLY | os.O_NOFOLLOW)
+        number = os.open(self.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)  # a pipe would wait forever
         with os.fdopen(number, "rb") as file:
             there = os.fstat(number)
-            if there.st_uid != os.geteuid() or there.st_size > _MOST_BYTES:
-                raise OSError(f"{self.path} is not of this user, or too long")
+            if not stat.S_ISREG(there.st_mode) or there.st_uid != os.geteuid() or there.st_size > _MOST_BYTES:
+                raise OSError(f"{self.path} is not a file of this user, or is too long")
             found = []
             for text in file.read().splitlines():
                 with suppress(msgspec.MsgspecError):  # the last one may be half a line

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from hfg.base.bounds import GRAPH_FILE_BYTES
+from hfg.base.whole import read_plain
 from hfg.files import describe, load, save, text_of
 from hfg.files.opening import SUFFIX
 from hfg.graph import Graph
@@ -24,6 +26,7 @@ __all__ = ["Project"]
 
 _MOST_FILES: Final = 1000
 _MOST_LINES: Final = 5000
+_MOST_BYTES: Final = GRAPH_FILE_BYTES.most + 1
 
 
 class Project:
@@ -127,7 +130,7 @@ class Project:
     def _fingerprint(self) -> str:
         """Tell contents apart."""
         try:
-            return "" if self.file is None else hashlib.sha256(self.file.read_bytes()).hexdigest()
+            return "" if self.file is None else hashlib.sha256(read_plain(self.file, _MOST_BYTES)).hexdigest()
         except OSError:
             return ""
 
@@ -166,6 +169,8 @@ class Project:
         """Take the file as it is on the disk."""
         if self.file is None:
             raise Refused("file", "the graph has no file that could be read again; save it first")
+        if not self.file.is_file():
+            raise Refused("file", f"{self.file.name} is no longer a file")
         self._take(self._read(self.file), self.file)
 
     def _need_saved(self, discard: bool) -> None:
@@ -248,8 +253,8 @@ class Project:
         """Return the difference between the file on the disk and the graph, line by line."""
         mine = text_of(describe(self.graph, beside=self.file)).splitlines()
         theirs: Sequence[str] = ()
-        if self.file is not None and self.file.name.endswith(SUFFIX) and self.file.exists():
-            theirs = self.file.read_text(encoding="utf-8", errors="replace").splitlines()
+        if self.file is not None and self.file.name.endswith(SUFFIX) and self.file.is_file():
+            theirs = read_plain(self.file, _MOST_BYTES).decode(errors="replace").splitlines()
         name = "new" if self.file is None else self.file.name
         return list(difflib.unified_diff(theirs, mine, f"{name} (disk)", f"{name} (yours)", lineterm=""))[:_MOST_LINES]
 

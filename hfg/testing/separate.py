@@ -94,7 +94,12 @@ def _share(module: str, task: _Task, result: type[T], tell: Callable[[T], None] 
         subprocess.Popen(
             [sys.executable, "-m", module, "--worker"],
             cwd=folder,
-            env={**os.environ, **_HEAP, "PYTHONPATH": path},
+            env={
+                **os.environ,
+                **_HEAP,
+                "PYTHONPATH": path,
+                "TMPDIR": folder,
+            },  # what a killed process leaves goes with it
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=told,

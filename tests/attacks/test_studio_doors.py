@@ -139,7 +139,7 @@ def test_programs_of_this_user_are_let_in(listener: OwnListener) -> None:
 def test_nobody_else_can_have_the_other_address_of_localhost(
     host: str, family: socket.AddressFamily, taken: str
 ) -> None:
-    """A browser that is told "localhost" tries ::1 first, and would tell the token to whoever listens there."""
+    """Browsers try ::1 first for "localhost", so another user who listens there would learn the token."""
 
     async def main() -> None:
         door = StudioDoor(asyncio.get_running_loop(), studio_of(doubling()))

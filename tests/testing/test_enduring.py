@@ -5,6 +5,7 @@ from __future__ import annotations
 import collections
 import os
 import signal
+import tempfile
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -72,6 +73,13 @@ def test_a_call_that_ends_the_process_is_named_with_its_arguments_and_the_others
     assert 0 < lived.refused < 200
     again = endure([f"{HERE}:dies_of_nan"], calls=200, most_deaths=2)[0]
     assert again.deaths == died.deaths  # the same seed, the same calls
+
+
+def test_a_process_that_dies_leaves_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    assert endure([f"{HERE}:dies_of_nan"], calls=200, most_deaths=1)[0].deaths
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.skipif("sys.platform != 'linux'", reason="pages are guarded by mprotect")

@@ -122,8 +122,10 @@ def find_files(pattern: str, order: str) -> list[Path]:
       OSError: there is none.
     """
     with reaching(pattern, "read"):
-        # Not Path.glob, which knows no absolute patterns.
-        found = [Path(name) for name in glob.glob(pattern, recursive=True) if not Path(name).is_dir()]  # noqa: PTH207
+        # Not Path.glob, which knows no absolute patterns. A pipe that others have put there would wait forever.
+        found = [path for path in map(Path, glob.glob(pattern, recursive=True)) if not path.is_dir()]  # noqa: PTH207
+        if glob.has_magic(pattern):
+            found = [path for path in found if path.is_file()]
         if not found:
             raise FileNotFoundError(errno.ENOENT, "")
         if order == "modified":
