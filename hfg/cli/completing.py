@@ -1,16 +1,20 @@
 """What the shell offers at the Tab key: targets, ports and parameters.
 
 The names of graphs are read from the text of a file, which is not run. Ports and parameters are known only when the
-graph is built, so there the target is imported, in silence; whatever goes wrong means no offer. Depends on `target`.
+graph is built, so there the target is imported, in silence; whatever goes wrong means no offer. A shell puts an offer
+into the command line as it is, and files and the names in them may be of others: what the shell would take for more
+than a word, such as `$(...)`, is not offered (rule L4). Depends on `target`.
 """
 
 from __future__ import annotations
 
 import ast
 import io
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import Final
 
 import typer
 
@@ -20,41 +24,47 @@ from hfg.nodetypes.node import Node
 
 __all__ = ["parameters", "ports", "targets"]
 
+_PLAIN: Final = re.compile(r"[\w./:=,@%+][\w./:=,@%+~\[\]-]*")
+
 
 def targets(incomplete: str) -> list[str]:
     """Python files, and the graphs of the one that is named."""
     name, colon, _ = incomplete.rpartition(":")
     file = Path(name if colon else incomplete)
     if file.suffix == ".py" and file.is_file():
-        return [one for one in (f"{file}:{graph}" for graph in _graphs_in(file)) if one.startswith(incomplete)]
+        return _plain(one for one in (f"{file}:{graph}" for graph in _graphs_in(file)) if one.startswith(incomplete))
     folder = Path(incomplete) if incomplete.endswith("/") else file.parent
     try:
         found = sorted(folder.iterdir())
     except OSError:
         return []
     offers = [f"{one}/" if one.is_dir() else str(one) for one in found if one.is_dir() or one.suffix == ".py"]
-    return [one for one in offers if one.startswith(incomplete) and not Path(one).name.startswith((".", "__"))]
+    return _plain(one for one in offers if one.startswith(incomplete) and not Path(one).name.startswith((".", "__")))
 
 
 def ports(ctx: typer.Context, incomplete: str) -> list[str]:
     """Outputs, events, inputs and slots of the target's nodes."""
-    return [
+    return _plain(
         one
         for path, node in _nodes(ctx)
         for kind in (node.ports.outputs, node.ports.events, node.ports.inputs, node.ports.slots)
         for one in (f"{path}.{name}" for name in kind)
         if one.startswith(incomplete)
-    ]
+    )
 
 
 def parameters(ctx: typer.Context, incomplete: str) -> list[str]:
     """Parameters of the target's nodes, as the beginning of an assignment."""
-    return [
+    return _plain(
         one
         for path, node in _nodes(ctx)
         for one in (f"{path}.{name}=" for name in node.ports.parameters)
         if one.startswith(incomplete)
-    ]
+    )
+
+
+def _plain(offers: Iterable[str]) -> list[str]:
+    return [one for one in offers if _PLAIN.fullmatch(one)]
 
 
 def _nodes(ctx: typer.Context) -> list[tuple[str, Node]]:
@@ -80,7 +90,7 @@ def _graphs_in(file: Path) -> list[str]:
     """Names in a file that are graphs, or functions that promise one, as far as its text shows."""
     try:
         body = ast.parse(file.read_bytes()).body
-    except (OSError, SyntaxError, ValueError):
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
         return []
     names = []
     for one in body:

@@ -158,12 +158,21 @@ def sweep(prefix: str = "hfg-") -> list[str]:
         )
     if unavailable() is not None:
         return []
-    names = sorted(one.name for one in _FOLDER.iterdir() if one.name.startswith(prefix) and _NAME.fullmatch(one.name))
+    names = sorted(one.name for one in os.scandir(_FOLDER) if one.name.startswith(prefix) and _is_own(one))
     alive = {name for name in names if "." not in name and _has_producer(name)}
     swept = [name for name in names if name.partition(".")[0] not in alive]
     for name in swept:
         remove(name)
     return swept
+
+
+def _is_own(entry: os.DirEntry[str]) -> bool:
+    """Tell our segments from thousands that another user may have made, before any is opened."""
+    if _NAME.fullmatch(entry.name) is None:
+        return False
+    with contextlib.suppress(OSError):  # it has gone
+        return entry.stat(follow_symlinks=False).st_uid == os.geteuid()
+    return False
 
 
 def _has_producer(name: str) -> bool:

@@ -124,6 +124,7 @@ class Victims:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
+            umask=0,  # what others must not read or change has its permissions by itself
         )
 
     def wait_ready(self) -> None:

@@ -12,10 +12,11 @@ import pytest
 
 import hfg
 from hfg.base.whole import GrowingFile, need_writable, read_plain, write_whole
-from hfg.errors import UsageError
+from hfg.errors import SharedMemoryError, UsageError
 from hfg.files.writing import write_text
 from hfg.nodes.files.access import find_files
 from hfg.recording.writing import open_new
+from hfg.sharedmemory import sweep
 from hfg.studio.journal import Journal
 from hfg.studio.project import Project
 from hfg.studio.refusing import Refused
@@ -140,3 +141,28 @@ def test_a_file_that_is_replaced_hands_down_no_right_to_run_as_its_owner(tmp_pat
     there.chmod(0o4755)
     write_whole(there, lambda file: file.write(b"new"))
     assert there.stat().st_mode & 0o7777 == 0o755
+
+
+@only_root
+def test_segments_of_another_user_are_not_opened_when_ours_are_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """There can be hundreds of thousands of them, and to open each would take the loop of a run a minute."""
+    theirs = [Path(f"/dev/shm/hfg-attack{os.getpid()}-a-1-o{number}") for number in range(3)]
+    opened: list[str] = []
+
+    def opens(name: str, *, writable: bool) -> tuple[int, int]:
+        opened.append(name)
+        raise SharedMemoryError(name)
+
+    monkeypatch.setattr("hfg.sharedmemory.names.open_existing", opens)
+
+    def makes() -> None:
+        for one in theirs:
+            one.touch()
+
+    as_nobody(makes)
+    try:
+        assert sweep(f"hfg-attack{os.getpid()}-") == []
+        assert opened == []
+    finally:
+        for one in theirs:
+            one.unlink()

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import hfg
+import hfg.nodes.flow
 from tests.cli.conftest import Command
 
 Tab = Callable[[str], list[str]]
@@ -49,6 +51,21 @@ def test_ports_and_parameters_of_the_target(tab: Tab) -> None:
     assert tab("hfg tap steps.py:build ear.") == ["ear.rang", "ear.quiet", "ear.heard", "ear.begin"]
     assert tab("hfg run steps.py:build --param st") == ["steps.count="]
     assert tab("hfg tap nowhere.py x") == []
+
+
+@pytest.mark.rule("L4")
+def test_names_that_a_shell_would_carry_out_are_not_offered(tab: Tab) -> None:
+    """Some shells put an offer into the line as it is, and others evaluate it at once."""
+    for name in ("$(id)", "`id`", "a;id", "a b", "a\x1b[2J", "a|id", "--allow=id", "a'b"):
+        Path(f"{name}.py").touch()
+    assert tab("hfg run ") == ["steps.py"]
+    assert tab("hfg run $") == tab("hfg run a") == []
+    graph = hfg.Graph("evil")
+    for name in ("$(id)", "good"):
+        graph.add(hfg.nodes.flow.Count(), name=name)
+    hfg.save(graph, "evil.hfg.yaml")
+    assert {one.partition(".")[0] for one in tab("hfg tap evil.hfg.yaml ")} == {"good"}
+    assert {one.partition(".")[0] for one in tab("hfg run evil.hfg.yaml --param ")} <= {"good"}
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -785,6 +785,7 @@ REFUSED = [
     (c.AddInput("in", "f()"), 'input "in" of the graph: "f()" is no type (what is f()?)'),
     (c.AddInput("in", "[int"), 'input "in" of the graph: "[int" is no type ('),
     (c.AddInput("in", "no_such_module.Thing"), "is no type (there is no no_such_module.Thing)"),
+    (c.AddInput("in", f"Literal[{'-' * 10_000}1]"), f'"Literal[{"-" * 192}" is no type ('),
     (c.AddInput("in", "os.sep"), 'the type of input "in" is'),
     (c.AddInput("in", int), 'AddInput takes type as a text such as "int", got'),  # type: ignore[arg-type]
     (c.AddOutput("start", "int"), 'graph "chain" has a port "start" already; choose another name'),

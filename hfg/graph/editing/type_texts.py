@@ -73,8 +73,9 @@ def type_of_text(text: str, where: str) -> Any:  # noqa: ANN401 - any type hint
         raise GraphError(f"{where}: a type is given as a text, got {text!r}; {remedy}")
     try:
         return _read(ast.parse(text, mode="eval").body)
-    except (SyntaxError, ValueError, TypeError, RecursionError) as error:
-        raise GraphError(f'{where}: "{text}" is no type ({error}); {remedy}') from error
+    except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError) as error:  # the last: nested too deeply
+        said = str(error) or "it is nested too deeply"
+        raise GraphError(f'{where}: "{text:.200}" is no type ({said:.200}); {remedy}') from error
 
 
 def _read(node: ast.expr) -> Any:  # noqa: ANN401

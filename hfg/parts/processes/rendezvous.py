@@ -88,16 +88,15 @@ def _sweep(place: Path) -> None:
     """Remove the folders in `place` whose runs are over; folders that cannot be read are not ours."""
     if sys.platform == "win32":
         return  # on systems without such sockets or locks of folders
-    folders: list[Path] = []
+    found: list[os.DirEntry[str]] = []
     with contextlib.suppress(PermissionError):  # users may be allowed to make folders there, but not to list them
-        folders = list(place.iterdir())
-    for folder in folders:
-        if _NAME.fullmatch(folder.name) is None:
-            continue
+        found = [entry for entry in os.scandir(place) if _NAME.fullmatch(entry.name)]
+    for entry in found:
         with contextlib.suppress(OSError):
-            found = folder.lstat()
-            if found.st_uid != os.geteuid() or time.time() - found.st_mtime < _YOUNG_S:
+            status = entry.stat(follow_symlinks=False)  # quick: another user may have made thousands
+            if status.st_uid != os.geteuid() or time.time() - status.st_mtime < _YOUNG_S:
                 continue
+            folder = Path(entry)
             lock = _lock(folder)
             if lock is not None:
                 remove(folder)
