@@ -647,6 +647,7 @@ class ReferenceMachine(Rings):
             for flight in station.flights:
                 self.abandon(flight)
         ended = [self.abandon_tasks(station) for station in self.stations]
+        self.loop.close_tasks()  # those that the code of nodes has left behind
         return all(ended)
 
     def fail_run(self, error: BaseException, outcome: str = "failed") -> None:

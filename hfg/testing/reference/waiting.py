@@ -13,7 +13,9 @@ import asyncio
 from collections.abc import Callable, Coroutine, Iterator, Set
 from contextlib import contextmanager
 from contextvars import Context, ContextVar, copy_context
+from types import CoroutineType
 from typing import Any, Final
+from weakref import WeakSet
 
 __all__ = ["MOMENT_S", "TEARDOWN_LIMIT_S", "HandTurnedLoop", "hand_turned_loop"]
 
@@ -33,6 +35,7 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
         self._now = now
         self._ready: list[tuple[object, asyncio.Handle]] = []
         self._timers: list[tuple[object, asyncio.TimerHandle]] = []
+        self._tasks: WeakSet[asyncio.Task[Any]] = WeakSet()
 
     # --- what asyncio asks of a loop
 
@@ -60,7 +63,9 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
         self, coro: Any, *, name: Any = None, context: Context | None = None, **_: Any
     ) -> asyncio.Task[Any]:
         """Make a task; its first step is one of the owner's next steps."""
-        return asyncio.Task(coro, loop=self, name=name, context=context)
+        task = asyncio.Task(coro, loop=self, name=name, context=context)
+        self._tasks.add(task)
+        return task
 
     def call_soon(  # type: ignore[override]
         self, callback: Any, *args: Any, context: Context | None = None
@@ -147,6 +152,13 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
         """Throw away what `owner` still has to do."""
         self._ready = [entry for entry in self._ready if entry[0] is not owner]
         self._timers = [entry for entry in self._timers if entry[0] is not owner]
+
+    def close_tasks(self) -> None:
+        """Close the code of all tasks that are not done, some of which may not have begun."""
+        for task in list(self._tasks):
+            coroutine = task.get_coro()
+            if not task.done() and isinstance(coroutine, CoroutineType):
+                coroutine.close()
 
     @contextmanager
     def entered(self) -> Iterator[None]:
