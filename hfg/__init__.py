@@ -31,7 +31,7 @@ engine; code that waits starts in layer 5.
     3  graph
     2  nodetypes   registry
     1  ports                transport   sharedmemory
-    0  errors  types  <-  base  <-  encoding  images  trace
+    0  errors  types  <-  base  <-  encoding  images  panels  trace
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Take the pictures of the studio in docs from the page itself, with the delivery robot on it.
 
     make docs-studio
+    python -m tools.draw_studio arena      only these pictures
 
 This needs Chromium, and the package playwright of the extra test. Run it after you have changed the page.
 """
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "pictures" / "studio"
-ROBOT = "examples.fetch_delivery.mission:build"
+ROBOT = ("examples.fetch_delivery.mission:build", "--arg", "robots=2", "--inside", "robot_0")
 WINDOW: ViewportSize = {"width": 1440, "height": 900}
 PATIENCE_S = 120.0  # the robot works meanwhile
 
@@ -34,9 +35,16 @@ def _look_away(page: Page) -> None:
     page.mouse.move(1000, 560)
 
 
+def _arena(page: Page) -> None:
+    """The views of the arena and of the cameras next to the mission."""
+    page.locator("#stage .caption", has_text="visit").wait_for()
+    page.locator(".live", has_text=re.compile("^live$")).wait_for()
+    _look_away(page)
+
+
 def _mission(page: Page) -> None:
     """The mission at work, with a node of it in the inspector."""
-    page.locator('[data-node="robot_0"]').dblclick(position={"x": 20, "y": 28})
+    page.keyboard.press("v")
     page.locator('[data-node="robot_0/fetch"].active').wait_for()
     page.locator('[data-node="robot_0/advance"] .t b').click()
     _look_away(page)
@@ -73,6 +81,7 @@ def _wire(page: Page) -> None:
 
 
 PICTURES: dict[str, Callable[[Page], None]] = {
+    "arena": _arena,
     "mission": _mission,
     "inside": _inside,
     "palette": _palette,
@@ -88,7 +97,7 @@ def main() -> None:
     from playwright.sync_api import sync_playwright
 
     FOLDER.mkdir(parents=True, exist_ok=True)
-    command = [sys.executable, "-m", "hfg", "studio", ROBOT, "--no-browser", "--run"]
+    command = [sys.executable, "-m", "hfg", "studio", *ROBOT, "--no-browser", "--run"]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as studio, sync_playwright() as tool:
         try:
             assert studio.stdout is not None
@@ -99,6 +108,8 @@ def main() -> None:
                 page.goto(found[0])
                 for name, act in PICTURES.items():
                     act(page)
+                    if sys.argv[1:] and name not in sys.argv[1:]:
+                        continue
                     for theme in ("light", "dark"):
                         page.evaluate(f"document.querySelector('[aria-label=\"Show the {theme} theme\"]')?.click()")
                         _settle(page)

@@ -26,6 +26,7 @@ __all__ = [
     "ParameterDescription",
     "PortDescription",
     "TypeDescription",
+    "describe_parameter",
     "describe_type",
     "undocumented",
 ]
@@ -222,7 +223,9 @@ def describe_type(of: NodeType | type[Node] | NodeFunction[..., Any], *, offered
         outputs=tuple(_ports(kind.outputs.values(), kind, read)),
         events=tuple(_ports(kind.events.values(), kind, read)) + _completed(kind, read),
         slots=tuple(_ports(kind.slots.values(), kind, read)),
-        parameters=tuple(_parameter(spec, kind, read) for spec in kind.parameters.values()),
+        parameters=tuple(
+            describe_parameter(spec, read.entries.get(spec.name, "")) for spec in kind.parameters.values()
+        ),
         errors=tuple(ErrorDescription(name, when) for name, when in read.errors),
         apex=read.apex,
     )
@@ -298,13 +301,14 @@ def _said_of_port(name: str, kind: NodeType, read: Documentation) -> str:
     return said or ""
 
 
-def _parameter(spec: ParameterSpec, kind: NodeType, read: Documentation) -> ParameterDescription:
+def describe_parameter(spec: ParameterSpec, doc: str = "") -> ParameterDescription:
+    """Describe a parameter; `doc` is its meaning if its declaration has none."""
     required = spec.default is REQUIRED
     return ParameterDescription(
         name=spec.name,
         kind=spec.kind,
         type="" if spec.trigger else describe(spec.type),
-        doc=spec.help or read.entries.get(spec.name, ""),
+        doc=spec.help or doc,
         default=None if required or spec.trigger else spec.default,
         required=required and spec.is_given,
         limits=dict(_limit(limit) for limit in spec.limits if not isinstance(limit, Inside)),

@@ -24,6 +24,9 @@ from hfg.engine import PunctualLoop
 from hfg.errors import TargetError
 from hfg.files.opening import SUFFIX
 from hfg.graph import Graph
+from hfg.graph.structure.level import inside as structure_of
+from hfg.graph.structure.level import level_of
+from hfg.graph.structure.paths import node_at
 from hfg.studio.project import Project
 from hfg.studio.studio import Studio
 
@@ -40,6 +43,7 @@ def studio(
     attach: Annotated[
         str | None, typer.Option(metavar="RUN", help="Follow and steer a run of hfg run: its process id or graph.")
     ] = None,
+    inside: Annotated[str, typer.Option(metavar="SUBGRAPH", help="Show the inside of a subgraph first.")] = "",
     run: Annotated[bool, typer.Option("--run", help="Start the graph at once.")] = False,
     read_only: Annotated[bool, typer.Option("--read-only", help="Pages may look, not change.")] = False,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
@@ -76,7 +80,14 @@ def studio(
     folder = Path.cwd() if file is None else file.resolve().parent
     project = Project(graph, folder, file, allow=allow or (), read=lambda path: load_graph(str(path), [], allow))
     why = "You may look, not change: the studio was started with --read-only." if read_only else ""
-    return _serve(Studio(project, read_only=why, target=target or graph.name), options, browser, at_once=run)
+    _need_subgraph(graph, inside)
+    made = Studio(project, read_only=why, target=target or graph.name, level=inside)
+    return _serve(made, options, browser, at_once=run)
+
+
+def _need_subgraph(graph: Graph, path: str) -> None:
+    if path and structure_of(node_at(level_of(graph), path)) is None:
+        raise TargetError(f'"{path}" is not a subgraph, so nothing is inside it; name another one by --inside')
 
 
 def _serve(made: Studio, options: Mapping[str, Any], browser: bool, *, at_once: bool) -> int:

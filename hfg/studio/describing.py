@@ -12,6 +12,7 @@ from typing import Any, Final
 import msgspec
 
 from hfg.catalogue import ParameterDescription, describe_type
+from hfg.catalogue.describing import describe_parameter
 from hfg.encoding import encode
 from hfg.errors import EncodingError, GraphError, shown
 from hfg.graph import Edge, Graph
@@ -23,10 +24,22 @@ from hfg.graph.structure.paths import node_at
 from hfg.graph.structure.subgraph import is_box, is_unnamed
 from hfg.nodetypes.description import NodeType
 from hfg.nodetypes.node import Node
+from hfg.panels import Call, Change
 from hfg.ports import Port
 from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS, SUBGRAPH_EVENTS, SUBGRAPH_SLOTS
 from hfg.ports.specs import REQUIRED, ParameterSpec
-from hfg.studio.records import EdgeRecord, GateRecord, GroupRecord, NodeRecord, OwnPortRecord, PortRecord, TypeRecord
+from hfg.studio.offering import arguments_of, offers
+from hfg.studio.records import (
+    ActionRecord,
+    EdgeRecord,
+    GateRecord,
+    GroupRecord,
+    NodeRecord,
+    OwnPortRecord,
+    PortRecord,
+    TypeRecord,
+    ViewRecord,
+)
 from hfg.types import describe
 
 __all__ = ["Records", "automatic_ports", "changed_record", "describe_graph", "type_record"]
@@ -221,6 +234,7 @@ def _edge_options(edge: Edge) -> dict[str, Any]:
 def type_record(kind: NodeType, key: str) -> TypeRecord:
     """Describe a node type as nodes of a graph have it."""
     described = describe_type(kind)
+    views, actions = offers(kind)
     return TypeRecord(
         reference=key,
         title=described.title,
@@ -231,7 +245,14 @@ def type_record(kind: NodeType, key: str) -> TypeRecord:
         source=described.source,
         parameters=[_parameter(kind.parameters[one.name], one) for one in described.parameters],
         docs={f"{what}/{port.name}": port.doc for what, port in described.ports() if port.doc},
+        views=[ViewRecord(name, one.title, one.doc) for name, one in views.items()],
+        actions=[_action(kind, name, one) for name, one in actions.items()],
     )
+
+
+def _action(kind: NodeType, name: str, action: Change | Call) -> ActionRecord:
+    arguments = [_parameter(spec, describe_parameter(spec)) for spec in arguments_of(kind, action)]
+    return ActionRecord(name, action.label, action.help, isinstance(action, Change), arguments)
 
 
 def _parameter(spec: ParameterSpec, described: ParameterDescription) -> dict[str, Any]:

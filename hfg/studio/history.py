@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from itertools import count
 from typing import Final
 
@@ -23,6 +24,7 @@ class Attribution:
         self._steps: dict[Transaction, StepRecord] = {}
         self._gestures: dict[Transaction, tuple[int, str]] = {}
         self._numbers = count(1)
+        self._calls: deque[StepRecord] = deque(maxlen=_MOST_SHOWN)
 
     def note(self, graph: Graph, by: int, gesture: str) -> None:
         """A page has made the last edit; what belongs to the same gesture becomes one step."""
@@ -40,6 +42,10 @@ class Attribution:
         if last not in self._steps:
             self._steps[last] = self._step(last, by)
 
+    def called(self, text: str, by: int) -> None:
+        """A page has carried out an action that cannot be undone."""
+        self._calls.append(StepRecord(next(self._numbers), text, by, time.time()))
+
     def _step(self, transaction: Transaction, by: int) -> StepRecord:
         return StepRecord(next(self._numbers), in_words(transaction.commands), by, time.time())
 
@@ -50,7 +56,7 @@ class Attribution:
         for transaction in self._steps.keys() - known:
             self._steps.pop(transaction)
             self._gestures.pop(transaction, None)
-        return HistoryRecord(self._shown(history.done), self._shown(history.undone))
+        return HistoryRecord(self._shown(history.done), self._shown(history.undone), list(self._calls))
 
     def _shown(self, transactions: list[Transaction]) -> list[StepRecord]:
         for one in transactions:

@@ -20,6 +20,7 @@ __all__ = [
     "SUBPROTOCOL",
     "VERSION",
     "Ack",
+    "Act",
     "Answer",
     "Arrange",
     "Ask",
@@ -152,6 +153,14 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     field: Text = ""
 
 
+class Act(Request, frozen=True, tag="act"):
+    """Carry out an action that a node offers (`hfg.panels`); what is not given is as the action suggests."""
+
+    path: Text
+    name: Text
+    args: dict[str, Any] = {}
+
+
 class Break(Request, frozen=True, tag="break"):
     """Pause whenever the run comes to a node, port or edge."""
 
@@ -257,6 +266,7 @@ FromPage: TypeAlias = (
     | Reset
     | Step
     | Trigger
+    | Act
     | Break
     | Unbreak
     | Arrange
@@ -290,6 +300,7 @@ class Hello(msgspec.Struct, frozen=True, tag="hello", tag_field="t"):
       automatic: ports that every node has, and every subgraph, by kind.
       topics: what can be subscribed to.
       now: the studio's clock, seconds since 1970.
+      level: the subgraph that a page shows first, "" for the whole graph.
     """
 
     v: int
@@ -301,6 +312,7 @@ class Hello(msgspec.Struct, frozen=True, tag="hello", tag_field="t"):
     automatic: dict[str, list[dict[str, str]]]
     topics: list[str]
     now: float
+    level: str = ""
 
 
 class Snapshot(msgspec.Struct, frozen=True, tag="snapshot", tag_field="t"):

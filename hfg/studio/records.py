@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 
 __all__ = [
+    "ActionRecord",
     "BreakpointRecord",
     "EdgeRecord",
     "FileRecord",
@@ -24,6 +25,7 @@ __all__ = [
     "RunRecord",
     "StepRecord",
     "TypeRecord",
+    "ViewRecord",
     "ViewersRecord",
 ]
 
@@ -137,6 +139,28 @@ class OwnPortRecord(msgspec.Struct, frozen=True):
     type: str
 
 
+class ViewRecord(msgspec.Struct, frozen=True):
+    """A view that a node type offers."""
+
+    name: str
+    title: str
+    doc: str
+
+
+class ActionRecord(msgspec.Struct, frozen=True):
+    """An action that a node type offers; `undoable`: it sets parameters, so that it can be taken back.
+
+    Attributes:
+      arguments: what people give to it, as parameters with the values that it suggests.
+    """
+
+    name: str
+    label: str
+    doc: str
+    undoable: bool
+    arguments: list[dict[str, Any]]
+
+
 class TypeRecord(msgspec.Struct, frozen=True):
     """A node type; `docs` are of its ports by "kind/name", `ports` only of a type that was asked for by itself."""
 
@@ -150,6 +174,8 @@ class TypeRecord(msgspec.Struct, frozen=True):
     parameters: list[dict[str, Any]]
     docs: dict[str, str]
     ports: list[dict[str, str]] = []
+    views: list[ViewRecord] = []
+    actions: list[ActionRecord] = []
 
 
 class ProblemRecord(msgspec.Struct, frozen=True):
@@ -218,10 +244,11 @@ class StepRecord(msgspec.Struct, frozen=True):
 
 
 class HistoryRecord(msgspec.Struct, frozen=True):
-    """What can be undone and redone, the latest last; `saved`: number of the step at which the file was written."""
+    """What can be undone and redone, the latest last; `calls`: actions that were carried out and cannot be undone."""
 
     done: list[StepRecord]
     undone: list[StepRecord]
+    calls: list[StepRecord] = []
 
 
 class JournalOffer(msgspec.Struct, frozen=True):

@@ -9,9 +9,11 @@ from hfg.graph.editing import Transaction, history_of
 from hfg.graph.editing.commands import Command, Note, decode
 from hfg.graph.structure.level import inside, level_of
 from hfg.graph.structure.paths import node_at
+from hfg.panels import Change
 from hfg.studio import messages as m
 from hfg.studio.asking import ask
 from hfg.studio.following import Following
+from hfg.studio.offering import change_of, offered_action, signal_of
 from hfg.studio.refusing import Refused
 from hfg.studio.viewing import Viewer
 from hfg.studio.words import in_words
@@ -135,6 +137,17 @@ async def _trigger(host: Host, viewer: Viewer, message: m.Trigger) -> None:
     await host.steering.trigger(message.path, message.value, message.activity)
 
 
+async def _act(host: Host, viewer: Viewer, message: m.Act) -> None:
+    kind, action = offered_action(host.graph, message.path, message.name)
+    if isinstance(action, Change):
+        await edit(host, viewer, change_of(message.path, kind, action, message.args))
+        return
+    value, said = signal_of(message.path, kind, action, message.args)
+    await host.steering.trigger(f"{message.path}.{action.slot}", value, None)
+    host.attribution.called(said, viewer.number)
+    host.singles_changed(viewer.number, said)
+
+
 async def _break(host: Host, viewer: Viewer, message: m.Break) -> None:
     host.steering.break_at(message.path, message.condition)
 
@@ -193,6 +206,7 @@ _DO: Final[Mapping[type[m.Request], Callable[[Any, Viewer, Any], Awaitable[Any]]
     m.Reset: _reset,
     m.Step: _step,
     m.Trigger: _trigger,
+    m.Act: _act,
     m.Break: _break,
     m.Unbreak: _unbreak,
     m.Open: _open,

@@ -63,14 +63,22 @@ class Studio(Following):
     Attributes:
       boot: differs for each studio, so that pages know whether their revisions are of this one.
       read_only: why nothing can be changed; "" if it can.
+      level: the subgraph that a page shows first.
     """
 
     def __init__(
-        self, project: Project, *, read_only: str = "", run: Run | None = None, target: str | bool = False
+        self,
+        project: Project,
+        *,
+        read_only: str = "",
+        run: Run | None = None,
+        target: str | bool = False,
+        level: str = "",
     ) -> None:
         super().__init__(project, Steering(project.graph, self, target))
         self.boot = os.urandom(8).hex()
         self.read_only = read_only
+        self.level = level
         self._count = 0
         self._beating: asyncio.TimerHandle | None = None
         self._looking: asyncio.TimerHandle | None = None
@@ -99,6 +107,7 @@ class Studio(Following):
                 automatic=automatic_ports(),
                 topics=list(TOPICS),
                 now=time.time(),
+                level=self.level,
             )
         )
         return viewer

@@ -1,6 +1,6 @@
 """Topics to which pages subscribe, by name. Each topic knows what is new; nothing is computed until a frame is due.
 
-Depends on `sampled_topics` and `tapped_topics`.
+Depends on `sampled_topics`, `tapped_topics` and `scenes`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from hfg.studio.logs import LogKeeper
 from hfg.studio.refusing import Refused
 from hfg.studio.run_topics import RunTopic
 from hfg.studio.sampled_topics import Flows, LoadTopic, Measures, NodeTopic, TimelineTopic
+from hfg.studio.scenes import SceneTopic
 from hfg.studio.spans import Ways
 from hfg.studio.tapped_topics import HistoryTopic, ImageTopic, ValueTopic
 from hfg.trace import ActivityChanged, TraceEvent
@@ -127,6 +128,11 @@ class _Picture(_Args, frozen=True):
     quality: int = 75
 
 
+class _View(_Args, frozen=True):
+    path: str
+    name: str
+
+
 class _Field(_Args, frozen=True):
     path: str
     field: str = ""
@@ -144,6 +150,7 @@ TOPICS: Final[Mapping[str, tuple[type[_Args], Callable[[Following, Any], RunTopi
         lambda host, args: ImageTopic(host, args.path, min(max(args.size, 16), 2048), min(max(args.quality, 1), 100)),
     ),
     "history": (_Field, lambda host, args: HistoryTopic(host, args.path, args.field)),
+    "view": (_View, lambda host, args: SceneTopic(host, args.path, args.name)),
     "timeline": (_Nothing, lambda host, _: TimelineTopic(host)),
     "log": (_Nothing, lambda host, _: LogTopic(host)),
 }

@@ -12,6 +12,8 @@ import { Rail } from "./shell/Rail";
 import { StatusBar } from "./shell/StatusBar";
 import { Toasts } from "./shell/Toasts";
 import { TopBar } from "./shell/TopBar";
+import { Stage } from "./stage/Stage";
+import { useOffers } from "./stage/offers";
 import { useStudio } from "./state/studio";
 import { BottomPanel } from "./timeline/BottomPanel";
 import { applyTheme } from "./ui/colours";
@@ -22,13 +24,15 @@ export function App() {
   const side = useStudio((s) => s.side);
   const old = useStudio((s) => s.age === 3);
   const start = useStudio((s) => s.rev >= 0 && !s.begun && Object.keys(s.tables.nodes).length === 0 && s.tables.studio.file?.kind === "none");
+  const staged = useStudio((s) => s.stage);
+  const hasViews = useOffers().views.length > 0;
   useKeys();
   useFailures();
   useEffect(() => {
     applyTheme(theme);
     localStorage.setItem("hfg-theme", theme);
   }, [theme]);
-  const classes = ["frame", !side && "noside", old && "old"].filter(Boolean).join(" ");
+  const classes = ["frame", !side && "noside", staged && hasViews && !start && "staged", old && "old"].filter(Boolean).join(" ");
   return (
     <div className={classes}>
       <TopBar />
@@ -37,6 +41,11 @@ export function App() {
         <StartPage />
       ) : (
         <>
+          {staged && hasViews && (
+            <Guard of="The views">
+              <Stage />
+            </Guard>
+          )}
           <div className="middle">
             <FileBar />
             <Guard of="The graph">

@@ -31,6 +31,7 @@ from examples.fetch_delivery.world import Cameras, Fault
 from hfg.images import Gray
 from hfg.nodes import activity, flow
 from hfg.nodes.robotics import Disk
+from hfg.panels import Look, Scene, view
 
 
 class Perception(hfg.Subgraph):
@@ -139,6 +140,19 @@ class Robot(hfg.Subgraph):
     look_ahead, look_into_basket = hfg.Output(bool), hfg.Output(bool)
     begin = hfg.slot(type=object)
     report = hfg.Event(int | None)
+
+    @view("What the robot sees")
+    def seen(self, look: Look) -> Scene:
+        """The last pictures of both cameras, with what was found in them, and the active step."""
+        from examples.fetch_delivery.showing.live import eyes  # only for pages
+
+        return eyes(
+            look.latest("front"),
+            look.latest("perception/targets.out") or [],
+            look.latest("perception/digits.out") or [],
+            look.latest("basket"),
+            max(look.active(), key=len, default="nothing is active").replace("/", ", "),
+        )
 
     def build(self, graph: hfg.Graph) -> None:
         """Figure 19."""

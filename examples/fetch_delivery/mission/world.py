@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, get_args
 
 from annotated_types import Ge, Interval
 
@@ -11,8 +11,31 @@ from examples.fetch_delivery.messages import Odometry, Scan, Twist
 from examples.fetch_delivery.world import Cameras, Fault, Simulation
 from examples.fetch_delivery.world.robots import Limits
 from hfg.images import Gray
+from hfg.panels import Call, Change, Look, Scene, view
 
 RATE_HZ = 10.0
+
+Blocked: TypeAlias = Literal[
+    "none",
+    "filling 0",
+    "filling 1",
+    "filling 2",
+    "filling 3",
+    "delivery 1",
+    "delivery 2",
+    "delivery 3",
+    "delivery 4",
+]
+"""No station, or one of them: its kind and number."""
+
+
+class Push(NamedTuple):
+    """A push, as seen from the robot: ahead, to its left, and counter-clockwise."""
+
+    robot: Annotated[int, Interval(ge=0, le=3)] = 0
+    ahead: Annotated[float, Interval(ge=-1, le=1), hfg.Parameter(unit="m")] = -0.3
+    left: Annotated[float, Interval(ge=-1, le=1), hfg.Parameter(unit="m")] = 0.3
+    turn: Annotated[float, Interval(ge=-3.2, le=3.2), hfg.Parameter(unit="rad")] = 0.4
 
 
 class World(hfg.Node):
@@ -23,7 +46,9 @@ class World(hfg.Node):
 
     Attributes:
       seed: decides what looks like chance.
-      speed: of the motors.
+      speed: of the motors, at most.
+      light: how bright it is, 1 as usual.
+      blocked: the station before which a crate stands.
       faults: what should go wrong.
       cameras: what draws the pictures.
       odometry: of each robot; their number is that of the robots.
@@ -41,6 +66,8 @@ class World(hfg.Node):
 
     seed = hfg.Parameter(1, Ge(0))
     speed = hfg.Parameter(0.6, Interval(gt=0, le=3), unit="m/s")
+    light = hfg.Parameter(1.0, Interval(ge=0, le=1))
+    blocked = hfg.Parameter[Blocked]("none", choices=get_args(Blocked))
     faults = hfg.Parameter[tuple[Fault, ...]](())
     cameras = hfg.Parameter[Cameras]("light")
     odometry = hfg.Outputs(Odometry)
@@ -49,6 +76,10 @@ class World(hfg.Node):
     front = hfg.Events(Gray, "odometry")
     basket = hfg.Events(Gray, "odometry")
     delivered = hfg.Events(int, "odometry")
+
+    block_station = Change("Block a station", {"blocked": "filling 1"}, "A crate stands before it.")
+    dim_light = Change("Dim the light", {"light": 0.05}, "The cameras see hardly anything.")
+    push_robot = Call("Push a robot", "push", "Its wheels do not notice, so it has to find out where it is.")
 
     simulation: hfg.State[Any] = hfg.State(None)
     pictures = hfg.State(0)
@@ -62,6 +93,7 @@ class World(hfg.Node):
 
     def process(self) -> None:
         """Let a tenth of a second pass, and measure."""
+        self._set_up()
         before = [len(score.delivered) for score in self.simulation.scores]
         self.simulation.step(1 / RATE_HZ)
         for robot, score in enumerate(self.simulation.scores):
@@ -70,6 +102,30 @@ class World(hfg.Node):
             for _, cube in score.delivered[before[robot] :]:
                 self.delivered[robot].trigger(cube)
         self.message.send(self.simulation.message())
+
+    def _set_up(self) -> None:
+        """Let the world be as the parameters are now."""
+        simulation = self.simulation
+        simulation.light = self.light
+        kind, _, number = self.blocked.partition(" ")
+        simulation.blocked = simulation.arena.station(kind, int(number)) if number else None
+        simulation.limit(self.speed)
+
+    @view("The arena from above")
+    def seen_from_above(self, look: Look) -> Scene:
+        """Robots with their laser rays, the stations, the people who serve them, and what stands in the way."""
+        from examples.fetch_delivery.showing.live import arena  # only for pages
+
+        scans = [look.latest(f"scan[{number}]") for number in range(len(self.simulation.robots))]
+        return arena(self.simulation, scans)
+
+    @hfg.slot
+    def push(self, push: Push) -> None:
+        """Push a robot."""
+        if push.robot >= len(self.simulation.robots):
+            self.log.warning("there is no robot %d that could be pushed", push.robot)
+            return
+        self.simulation.push(push.robot, push.ahead, push.left, push.turn)
 
     @hfg.Slots(Twist, "odometry")
     def command(self, robot: int, twist: Twist) -> None:

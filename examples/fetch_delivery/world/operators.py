@@ -46,6 +46,11 @@ class Operator:
         self._straight_s = math.inf
         self._given = 0
 
+    @property
+    def due_s(self) -> float | None:
+        """The time at which a cube changes hands; infinite after it has, None while no robot waits."""
+        return self._due_s
+
     def watch(
         self,
         now_s: float,

@@ -134,6 +134,7 @@ class Renderer:
         turning: float = 0.0,
         sideways: float = 0.0,
         shake: tuple[int, int] = (0, 0),
+        light: float = 1.0,
     ) -> Picture:
         """Take a picture with the front camera.
 
@@ -144,16 +145,17 @@ class Renderer:
           turning: how fast the robot turns, in rad/s; blurs the picture.
           sideways: how fast it moves to its side, in m/s; blurs it a little.
           shake: where the noise is cut from, below 128 each.
+          light: how bright it is, from 0 to 1. The noise stays the same.
         """
         picture = self._draw_front(pose, around, hidden)
         length = round(FOCAL_PX * EXPOSURE_S * (abs(turning) + abs(sideways) / 3))
         if length > 1:
             picture = np.asarray(cv2.blur(picture, (length, 1)), np.uint8)
-        return self._with_noise(picture, shake)
+        return self._with_noise(_lit(picture, light), shake)
 
-    def basket(self, cube: Cube | None, *, shake: tuple[int, int] = (0, 0)) -> Picture:
+    def basket(self, cube: Cube | None, *, shake: tuple[int, int] = (0, 0), light: float = 1.0) -> Picture:
         """Take a picture of the basket."""
-        return self._with_noise(self._draw_basket(cube), shake)
+        return self._with_noise(_lit(self._draw_basket(cube), light), shake)
 
     def _draw_front(
         self, pose: tuple[float, float, float], around: tuple[Round, ...], hidden: frozenset[str]
@@ -235,6 +237,10 @@ class Renderer:
         down, right = shake
         cut = np.s_[down : down + HEIGHT, right : right + WIDTH]
         return np.asarray(cv2.subtract(cv2.add(picture, self._brighter[cut]), self._darker[cut]), np.uint8)
+
+
+def _lit(picture: Picture, light: float) -> Picture:
+    return picture if light == 1.0 else np.asarray(cv2.convertScaleAbs(picture, alpha=light), np.uint8)
 
 
 def _camera(pose: tuple[float, float, float], camera: Camera) -> tuple[Vector, Vector]:

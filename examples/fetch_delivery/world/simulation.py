@@ -8,6 +8,7 @@ the same world.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Literal, TypeAlias, TypeVar
 
 import cv2
@@ -15,7 +16,7 @@ import numpy as np
 
 from examples.fetch_delivery.messages import Odometry, Picture, Scan, Twist, Vector
 from examples.fetch_delivery.world import scanning
-from examples.fetch_delivery.world.arena import Arena
+from examples.fetch_delivery.world.arena import Arena, Station
 from examples.fetch_delivery.world.faults import (
     AbsentOperator,
     BlockedStation,
@@ -48,6 +49,8 @@ class Simulation:
       arena: where walls, signs and stations really are.
       robots: where the robots really are; for tests, pictures of the run and referees, not for the robots.
       scores: one for each robot.
+      light: how bright it is, 1 as usual, 0 in the dark.
+      blocked: the station before which a crate stands now, besides those of faults; None if there is none.
     """
 
     def __init__(
@@ -93,6 +96,8 @@ class Simulation:
         self._cubes: list[Cube | None] = [None] * robots
         self._touched = [False] * robots
         self._ticks = 0
+        self.light = 1.0
+        self.blocked: Station | None = None
         self._renderer = _renderer(cameras, self.arena)
         self._check_faults()
 
@@ -150,6 +155,33 @@ class Simulation:
         self._robot(robot)
         self.scores[robot].reported.append((self.now_s, number))
 
+    # --- what people do to them ---
+
+    def push(self, robot: int, dx: float, dy: float, turn: float) -> None:
+        """Push a robot, as seen from it: its wheels do not notice.
+
+        Raises:
+          ValueError: if there is no such robot.
+        """
+        self._robot(robot).shift(dx, dy, turn)
+
+    def limit(self, speed: float) -> None:
+        """Let all motors reach this speed, in m/s, and no more.
+
+        Raises:
+          ValueError: if no motor can do that.
+        """
+        for robot in self.robots:
+            robot.limits = replace(robot.limits, speed=speed)
+
+    def handing_over(self) -> list[tuple[int, Station, float]]:
+        """Return the robots that people have begun to serve: number, station, and in how many seconds they are done."""
+        served = []
+        for number, (robot, operator) in enumerate(zip(self.robots, self._operators, strict=True)):
+            if operator.due_s is not None and math.isfinite(operator.due_s):
+                served.append((number, self.arena.nearest(robot.x, robot.y), operator.due_s - self.now_s))
+        return served
+
     # --- what robots sense ---
 
     def odometry(self, robot: int) -> Odometry:
@@ -160,7 +192,7 @@ class Simulation:
     def scan(self, robot: int) -> Scan:
         """Turn the laser once."""
         body = self._robot(robot)
-        discs = [(other.x, other.y, RADIUS_M) for other in self.robots if other is not body] + self._crates()
+        discs = [(other.x, other.y, RADIUS_M) for other in self.robots if other is not body] + self.crates()
         table = np.array(discs).reshape(-1, 3)
         ranges = scanning.cast(self.arena, body.x, body.y, body.theta + scanning.ANGLES, table)
         noise = self._chance(3, robot).normal(0.0, scanning.NOISE_M, len(ranges))
@@ -171,7 +203,7 @@ class Simulation:
         """Take a picture with the camera that looks ahead."""
         body = self._robot(robot)
         others = [Round(other.x, other.y, RADIUS_M, ROBOT_HEIGHT_M, 60) for other in self.robots if other is not body]
-        crates = [Round(x, y, radius, CRATE_HEIGHT_M, 90) for x, y, radius in self._crates()]
+        crates = [Round(x, y, radius, CRATE_HEIGHT_M, 90) for x, y, radius in self.crates()]
         hidden = (f"digit {fault.digit}" for fault in self._now(HiddenSign))
         return self._renderer.front(
             (body.x, body.y, body.theta),
@@ -180,12 +212,13 @@ class Simulation:
             turning=body.omega,
             sideways=body.vy,
             shake=self._shake(4, robot),
+            light=self.light,
         )
 
     def basket_picture(self, robot: int) -> Picture:
         """Take a picture with the camera that looks into the basket."""
         self._robot(robot)
-        return self._renderer.basket(self._cubes[robot], shake=self._shake(5, robot))
+        return self._renderer.basket(self._cubes[robot], shake=self._shake(5, robot), light=self.light)
 
     # --- what a referee knows ---
 
@@ -205,7 +238,7 @@ class Simulation:
         for fault in self._faults:
             if before <= fault.at_s < self.now_s:
                 self._strike(fault)
-        collide(self.robots, self.arena, self._crates())
+        collide(self.robots, self.arena, self.crates())
         for number in range(len(self.robots)):
             self._judge(number)
             self._let_operator(number)
@@ -255,13 +288,12 @@ class Simulation:
     def _now(self, kind: type[_Kind]) -> list[_Kind]:
         return [fault for fault in self._faults if isinstance(fault, kind) and fault.lasts(self.now_s)]
 
-    def _crates(self) -> list[tuple[float, float, float]]:
-        places = []
-        for fault in self._now(BlockedStation):
-            station = self.arena.station(fault.kind, fault.number)
-            x, y = station.x + 0.5 * math.cos(station.facing), station.y + 0.5 * math.sin(station.facing)
-            places.append((x, y, CRATE_M))
-        return places
+    def crates(self) -> list[tuple[float, float, float]]:
+        """Say where crates stand: x, y and radius."""
+        blocked = [self.arena.station(fault.kind, fault.number) for fault in self._now(BlockedStation)]
+        if self.blocked is not None:
+            blocked.append(self.blocked)
+        return [(one.x + 0.5 * math.cos(one.facing), one.y + 0.5 * math.sin(one.facing), CRATE_M) for one in blocked]
 
     def _check_faults(self) -> None:
         for fault in self._faults:

@@ -36,8 +36,8 @@ function toActivityChange(way: 1 | -1): void {
 }
 
 function leaveSomething(): void {
-  const { menu, popover, selectedEdge, selection, panel, level } = studio();
-  if (menu || popover) change({ menu: null, popover: null, palette: null });
+  const { menu, popover, acting, selectedEdge, selection, panel, level } = studio();
+  if (menu || popover || acting) change({ menu: null, popover: null, palette: null, acting: null });
   else if (selection.size > 0 || selectedEdge) act.select([]);
   else if (panel) change({ panel: null });
   else if (level !== "") act.leave();
@@ -80,6 +80,8 @@ export const DOINGS: Doing[] = [
   { name: "To the change of activity after", keys: "]", run: () => toActivityChange(1) },
   { name: "Outline", keys: "O", run: () => change({ panel: studio().panel === "outline" ? null : "outline" }) },
   { name: "Timeline", keys: "T", run: () => change({ time: !studio().time }) },
+  { name: "Views of nodes", keys: "V", run: () => change({ stage: !studio().stage }) },
+  { name: "Actions of nodes", keys: "X", off: edits(), run: () => change({ popover: "actions" }) },
   { name: "Inspector", keys: "I", run: () => change({ side: !studio().side }) },
   { name: "Light or dark", keys: "", run: () => change({ theme: studio().theme === "dark" ? "light" : "dark" }) },
   { name: "Save", keys: "Ctrl+S", off: edits(), run: () => void act.save() },

@@ -1,5 +1,7 @@
 import { Palette } from "../palette/Palette";
 import { useStudio } from "../state/studio";
+import { ActionForm } from "../stage/ActionForm";
+import { ActionMenu } from "../stage/ActionMenu";
 import { Commands } from "./Commands";
 import { Connect } from "./Connect";
 import { Keys } from "./Keys";
@@ -11,6 +13,8 @@ export function Popovers() {
   return (
     <>
       <Palette />
+      {popover === "actions" && <ActionMenu />}
+      <ActionForm />
       {popover === "commands" && <Commands />}
       {popover === "connect" && <Connect />}
       {popover === "keys" && <Keys />}

@@ -91,6 +91,21 @@ export interface ParameterType {
   [more: string]: unknown;
 }
 
+export interface ViewRecord {
+  name: string;
+  title: string;
+  doc: string;
+}
+
+export interface ActionRecord {
+  name: string;
+  label: string;
+  doc: string;
+  undoable: boolean;
+  /** With what the action suggests as defaults. */
+  arguments: ParameterType[];
+}
+
 export interface TypeRecord {
   reference: string;
   title: string;
@@ -104,7 +119,24 @@ export interface TypeRecord {
   docs: Record<string, string>;
   /** Only of a type that was asked for by itself. */
   ports?: { kind: PortKind; name: string; type: string }[];
+  views: ViewRecord[];
+  actions: ActionRecord[];
 }
+
+/** A drawing in the coordinates of its world: shapes by kind, those before below those behind. */
+export interface Scene {
+  bounds: [left: number, bottom: number, right: number, top: number];
+  caption: string;
+  shapes: Shape[];
+}
+
+export type Shape =
+  | ["line", points: Point[], fill: "", colour: string, width: number]
+  | ["area", points: Point[], fill: string, colour: string, width: number]
+  | ["disc", at: Point, radius: number, fill: string, colour: string, width: number]
+  | ["rays", begin: Point, ends: Point[], colour: string]
+  | ["text", text: string, at: Point, size: number, colour: string, anchor: "start" | "middle" | "end"]
+  | ["image", base64: string, box: [left: number, bottom: number, right: number, top: number]];
 
 export type Point = [number, number];
 
@@ -223,6 +255,8 @@ export interface HistoryStep {
 export interface HistoryRecord {
   done: HistoryStep[];
   undone: HistoryStep[];
+  /** Actions that were carried out and cannot be undone. */
+  calls: HistoryStep[];
   saved: number;
 }
 
@@ -261,6 +295,8 @@ export interface Hello {
   automatic: Record<string, { name: string; type: string }[]>;
   topics: string[];
   now: number;
+  /** What a page shows first. */
+  level: string;
 }
 
 export interface Reject {

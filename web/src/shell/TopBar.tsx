@@ -1,6 +1,7 @@
-import { choose, enter, redo, undo } from "../state/actions";
+import { choose, enter, locked, redo, undo } from "../state/actions";
 import { layoutKey, change, useStudio, type View } from "../state/studio";
 import { nameOf } from "../state/paths";
+import { useOffers } from "../stage/offers";
 import { Icon } from "../ui/Icon";
 import { Clock } from "./Clock";
 import { RunControl } from "./RunControl";
@@ -14,6 +15,7 @@ export function TopBar() {
       <span className="spring" />
       <RunControl />
       <Clock />
+      <ActionsButton />
       <span className="spring" />
       <ViewSwitch />
       <button type="button" className="find" aria-label="Find or do anything" onClick={() => change({ popover: "commands" })}>
@@ -25,6 +27,29 @@ export function TopBar() {
       <UndoButtons />
       <ThemeButton />
     </header>
+  );
+}
+
+/** What nodes offer to do, in a menu; not there if no node offers anything. */
+function ActionsButton() {
+  const { actions } = useOffers();
+  const open = useStudio((s) => s.popover === "actions");
+  useStudio((s) => s.age === 3); // it locks with the edits
+  if (actions.length === 0) return null;
+  const why = locked();
+  return (
+    <button
+      type="button"
+      className="btn line actions-button"
+      title={why || "What one can do to the nodes (X)"}
+      aria-haspopup="menu"
+      aria-expanded={open}
+      disabled={why !== ""}
+      onClick={() => change({ popover: open ? null : "actions" })}
+    >
+      <Icon name="bolt" />
+      <span className="hide-n">Actions</span>
+    </button>
   );
 }
 

@@ -1,5 +1,5 @@
 import { Refusal } from "../protocol/socket";
-import type { Command, Data, FoundRow, Message } from "../protocol/types";
+import type { ActionRecord, Command, Data, FoundRow, Message } from "../protocol/types";
 import { socket, showLevel } from "./link";
 import { edgeKey, endsOf, isInside, joined, nameOf, parentOf } from "./paths";
 import { change, studio, type Toast, type View } from "./studio";
@@ -226,6 +226,17 @@ export async function pasteText(text: string): Promise<void> {
   } catch (error) {
     toast(error instanceof Error ? error.message : String(error), { kind: "bad" });
   }
+}
+
+/** Carries out an action that a node offers; gives the studio's sentence if it refuses, "" if it is done. */
+export async function act(path: string, action: ActionRecord, args: Record<string, Data>): Promise<string> {
+  try {
+    await socket.request({ t: "act", path, name: action.name, args });
+  } catch (error) {
+    return error instanceof Error ? error.message : String(error);
+  }
+  toast(action.label, action.undoable ? { title: "Done:", action: { label: "Undo", act: () => void undo() } } : { title: "Done:" }, 4000);
+  return "";
 }
 
 export async function toggleBreak(path: string): Promise<void> {

@@ -39,7 +39,9 @@ function address(): string {
 function heard(message: FromStudio): void {
   if (message.t === "snapshot") {
     boot = studio().hello?.boot ?? null;
+    const first = studio().rev < 0;
     change({ rev: message.rev, tables: fromSnapshot(message.tables) });
+    if (first) change({ level: studio().hello?.level ?? "" });
     keepLevel();
     showLevel();
   } else if (message.t === "patch") {

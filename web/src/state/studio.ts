@@ -5,7 +5,7 @@ import { EMPTY } from "./replica";
 export type View = "activity" | "mission" | "all";
 export type Tab = "timeline" | "problems" | "log" | "history";
 export type Panel = "outline" | null;
-export type Popover = "palette" | "commands" | "keys" | "tour" | "open" | "connect" | null;
+export type Popover = "palette" | "commands" | "keys" | "tour" | "open" | "connect" | "actions" | null;
 
 export interface Toast {
   id: number;
@@ -40,6 +40,14 @@ export interface Activity {
   ways: ReadonlySet<string>;
 }
 
+/** An action of a node that waits for its arguments, and where its form opens. */
+export interface Acting {
+  path: string;
+  name: string;
+  x: number;
+  y: number;
+}
+
 export interface Studio {
   phase: "connecting" | "open" | "closed" | "refused";
   closedWhy: string;
@@ -69,6 +77,10 @@ export interface Studio {
   renaming: string | null;
   side: boolean;
   time: boolean;
+  /** Whether views of nodes are shown beside the graph, and which: "path#name"; null: as it comes. */
+  stage: boolean;
+  views_shown: readonly string[] | null;
+  acting: Acting | null;
   pins: readonly string[];
   toasts: readonly Toast[];
   announced: string;
@@ -111,6 +123,9 @@ export const useStudio = create<Studio>()(() => ({
   renaming: null,
   side: window.innerWidth > 1100,
   time: true,
+  stage: window.innerWidth > 1100,
+  views_shown: null,
+  acting: null,
   pins: [],
   toasts: [],
   announced: "",

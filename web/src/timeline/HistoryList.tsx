@@ -7,7 +7,8 @@ export function HistoryList() {
   const me = useStudio((s) => s.hello?.viewer);
   const done = history?.done ?? [];
   const undone = history?.undone ?? [];
-  if (done.length + undone.length === 0) return <p className="empty">Nothing was changed yet. Everything that you change can be undone.</p>;
+  const calls = history?.calls ?? [];
+  if (done.length + undone.length + calls.length === 0) return <p className="empty">Nothing was changed yet. Everything that you change can be undone.</p>;
   return (
     <ul className="list">
       {[...undone].map((step) => (
@@ -21,13 +22,14 @@ export function HistoryList() {
           )}
         </li>
       ))}
-      {[...done].reverse().map((step, index) => (
+      {[...done, ...calls].sort((a, b) => b.at - a.at).map((step) => (
         <li key={step.n}>
           <span className="when">{time(step.at)}</span>
           <span className="what">{step.text}</span>
           <span className="muted">{step.by === me ? "you" : step.by === 0 ? "another program" : `viewer ${step.by}`}</span>
           {step.n === history?.saved && <span className="muted">saved</span>}
-          {index === 0 && (
+          {calls.includes(step) && <span className="muted">cannot be undone</span>}
+          {step === done.at(-1) && (
             <button type="button" className="btn small line" onClick={() => void undo()}>
               Undo
             </button>

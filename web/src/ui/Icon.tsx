@@ -32,6 +32,8 @@ const PATHS = {
   file: '<path d="M4 2h5l3 3v9H4zM9 2v3h3"/>',
   save: '<path d="M3 3h8l2 2v8H3zM5.5 3v3.500h5V3M5.500 13V9.500h5V13"/>',
   follow: '<path d="M2 8h8M7 5l3 3-3 3M13 3v10"/>',
+  bolt: '<path d="M9 1.5 3.500 9H7.500L7 14.500 12.500 7H8.500z"/>',
+  view: '<rect x="2" y="3" width="12" height="10" rx="1"/><path d="M2.500 11.500 6 7.500l2.500 2.500L10.500 8l3 3"/>',
   lock: '<rect x="3.5" y="7" width="9" height="6.5" rx="1"/><path d="M5.500 7V5a2.500 2.500 0 0 1 5 0v2"/>',
   layout: '<rect x="5.500" y="1.500" width="5" height="3.500" rx=".8"/><rect x="1.500" y="11" width="5" height="3.500" rx=".8"/><rect x="9.500" y="11" width="5" height="3.500" rx=".8"/><path d="M8 5v3M4 11V8h8v3"/>',
 } as const;
