@@ -27,6 +27,7 @@ SUITES = (
     "bench_files",
     "bench_kinds",
     "bench_live",
+    "bench_missions",
     "bench_observers",
     "bench_robot",
     "bench_shape",

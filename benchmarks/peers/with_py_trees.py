@@ -37,4 +37,49 @@ class PyTrees(Participant):
         return meter.figures()
 
 
+class Action(py_trees.behaviour.Behaviour):
+    """Run for some ticks; the last of them is the first one of the next action."""
+
+    def __init__(self, name: str, ticks: int) -> None:
+        super().__init__(name)
+        self.ticks = ticks
+
+    def initialise(self) -> None:
+        self.left = self.ticks
+
+    def update(self) -> Status:
+        self.left -= 1
+        return Status.RUNNING if self.left >= 0 else Status.SUCCESS
+
+
+class Condition(py_trees.behaviour.Behaviour):
+    """All is well."""
+
+    def update(self) -> Status:
+        return Status.SUCCESS
+
+
+class Mission:
+    """A tree of a battery, and tasks one after another, each with an action that repairs it."""
+
+    def __init__(self, tasks: int, ticks: int) -> None:
+        self.tasks = tasks
+        self.ticks = ticks
+
+    def tick(self, count: int) -> dict[str, float]:
+        """Tick the root so often."""
+        meter = Arrivals(count)
+        tasks = py_trees.composites.Sequence("tasks", memory=True)
+        for number in range(self.tasks):
+            task = py_trees.composites.Selector(f"task{number}", memory=True)
+            task.add_children([Action("act", self.ticks), Action("repair", self.ticks)])
+            tasks.add_child(task)
+        root = py_trees.composites.Sequence("mission", memory=False)
+        root.add_children([Condition("battery"), tasks])
+        for number in range(count):
+            root.tick_once()
+            meter.take(number)
+        return meter.figures()
+
+
 PEERS = [PyTrees()]
