@@ -118,15 +118,15 @@ def _operator(scene: Scene, station: Station, seconds: float) -> None:
 
 def _bullseye(scene: Scene, one: Sighting) -> None:
     u, v, size = _place(one, signs.BULLSEYE_HEIGHT_M, signs.BULLSEYE_M * signs.RINGS_SHARE)
-    scene.disc((u, v), size / 2 + 5, line="three", width=2)
-    scene.text(f"{one.distance:.1f} m", (u, v + size / 2 + 30), 30, "three")
+    scene.disc((u, v), size / 2 + 5, line="one", width=2)
+    scene.text(f"{one.distance:.1f} m", (u, v + size / 2 + 30), 30, "one")
 
 
 def _digit(scene: Scene, one: Sighting) -> None:
     u, v, size = _place(one, signs.DIGIT_HEIGHT_M, signs.DIGIT_M * signs.FRAME_SHARE)
     half = size / 2 + 5
-    scene.area(_square(u, v, half), line="one", width=2)
-    scene.text(f"{one.label}: {one.distance:.1f} m", (u, v - half - 18), 30, "one")
+    scene.area(_square(u, v, half), line="two", width=2)
+    scene.text(f"{one.label}: {one.distance:.1f} m", (u, v - half - 18), 30, "two")
 
 
 def _place(one: Sighting, height: float, size: float) -> tuple[float, float, float]:
