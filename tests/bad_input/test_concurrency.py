@@ -49,8 +49,8 @@ REFUSED: list[tuple[hfg.Node, dict[str, Any], str]] = [
     (
         numbers(),
         {"concurrency": 8},
-        'node "node": concurrency=8 lets several firings be under way at once, but the firings of a generator are its '
-        "steps, one after the other (rule F14); write an async function, or leave concurrency out",
+        'node "node": concurrency=8 lets several firings be in progress at once, but the firings of a generator are '
+        "its steps, one after the other (rule F14); write an async function, or leave concurrency out",
     ),
     (
         Ear(),
@@ -60,8 +60,8 @@ REFUSED: list[tuple[hfg.Node, dict[str, Any], str]] = [
     (
         forward_async(),
         {"concurrency": 8, "release": "sequential"},
-        'node "node": concurrency=8 does not go together with release="sequential", for its tokens count as processed '
-        "as soon as they are taken (rule F14); leave release out",
+        'node "node": concurrency=8 does not go together with release="sequential", because its tokens count as '
+        "processed as soon as they are taken (rule F14); leave release out",
     ),
     (
         Box(),
@@ -90,7 +90,7 @@ REFUSED: list[tuple[hfg.Node, dict[str, Any], str]] = [
         Counts(),
         {"retries": 3},
         'node "node": retries=3 would run a firing again with what the failed attempt has left in its state "total" '
-        "(rule X1); leave retries out, or keep the state in a node behind it",
+        "(rule X1); leave retries out, or keep the state in a node after it",
     ),
     (
         numbers(),

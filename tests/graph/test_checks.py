@@ -266,7 +266,7 @@ def test_queue_on_what_turns_out_to_be_synchronous_is_an_error(graph: Graph) -> 
     graph.connect(unit.seen, graph.add(Queue()).a)
     problem = one(graph)
     assert problem.path == "unit.out -> queue/unit.a"
-    assert "capacity=3 is said on queue.a.inner -> queue/unit.a" in problem.what
+    assert "capacity=3 is set on queue.a.inner -> queue/unit.a" in problem.what
 
 
 @pytest.mark.rule("P4", "G1")
@@ -283,8 +283,8 @@ def test_a_buffer_on_what_turns_out_to_be_a_signal_or_to_lead_into_a_slot_is_an_
     graph.connect(unit.out, box.look, buffer=2)
     found = [problem for problem in graph.check() if problem.check == "buffer-without-join"]
     assert [problem.path for problem in found] == ["unit.seen -> ahead/unit.a", "unit.out -> box/unit.look"]
-    assert "buffer=3 is said on ahead.a.inner -> ahead/unit.a" in found[0].what
-    assert "buffer=2 is said on unit.out -> box.look" in found[1].what
+    assert "buffer=3 is set on ahead.a.inner -> ahead/unit.a" in found[0].what
+    assert "buffer=2 is set on unit.out -> box.look" in found[1].what
 
 
 @pytest.mark.rule("P7", "G1")

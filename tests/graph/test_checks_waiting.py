@@ -61,7 +61,7 @@ def test_a_ring_whose_code_triggers_in_a_loop_is_told_with_its_place() -> None:
     (problem,) = found(ring("many"), "waiting-ring")
     assert (problem.severity, problem.path) == ("hint", "gate.many -> double.value")
     assert "gate -> double -> gate" in problem.what
-    assert "nobody can tell" in problem.why
+    assert "cannot be seen from outside" in problem.why
 
 
 @pytest.mark.rule("F8")

@@ -389,7 +389,7 @@ def test_a_promotion_is_followed_by_a_graph_that_runs() -> None:
 WRONG_PROMOTIONS = {
     c.Promote("loud.by", "loud/first.factor"): '"loud/first.factor" is promoted already',
     c.Promote("loud.bye", "loud/second.factor"): 'there is no "loud.bye"',
-    c.Promote("loud/second.factor", "loud/first.factor"): '"loud/second.factor" is no parameter of the subgraph',
+    c.Promote("loud/second.factor", "loud/first.factor"): '"loud/second.factor" is not a parameter of the subgraph',
     c.Promote("loud.by", "loud/second.factor", promoted=False): '"loud.by" does not stand for "loud/second.factor"',
     c.Promote(3, "loud/second.factor"): "3",  # type: ignore[arg-type]
 }
@@ -494,7 +494,7 @@ def test_what_no_command_can_say_is_named_with_what_to_do(what: str) -> None:
 
 
 def test_the_inside_is_told_with_the_whole_graph() -> None:
-    with pytest.raises(GraphError, match='the graph inside "loud" is told with the whole graph'):
+    with pytest.raises(GraphError, match='the graph inside "loud" is described with the whole graph'):
         louder()["loud"].graph.as_commands()
 
 
@@ -592,7 +592,7 @@ def test_an_operator_says_what_it_was_made_of_and_equals_one_made_the_same() -> 
     assert hfg.operator(ops.debounce)(0.2) == hfg.operator(ops.debounce)(0.2)
     with pytest.raises(hfg.errors.DeclarationError, match="hfg.operator takes a function .*, got 3; write it above"):
         hfg.operator(3)  # type: ignore[arg-type]
-    with pytest.raises(hfg.errors.DeclarationError, match="gave 5, which is no reactivex operator; let it return one"):
+    with pytest.raises(hfg.errors.DeclarationError, match="gave 5, which is not a reactivex operator; let it"):
         hfg.operator(lambda: 5)()  # type: ignore[arg-type, return-value]
 
 
@@ -713,21 +713,21 @@ REFUSED = [
     (c.Remove("frist"), 'there is no "frist": graph "chain" has no node "frist"; did you mean "first"?'),
     (c.Connect("first.out", "second.value"), "are connected already; an edge is drawn once"),
     (c.Connect("script.out", "second.value"), '"second.value" takes one edge and has one from "first.out"'),
-    (c.Connect("first.out", "join.a"), "the edit is refused, for it would break the graph"),
+    (c.Connect("first.out", "join.a"), "the edit is refused because it would break the graph"),
     (c.Connect("first", "sink.value"), '"first" is no port; name a port of a node, as in "first.name"'),
     (c.Connect("script.out", "text.word"), "port types do not fit"),
     (c.Disconnect("first.out", "sink.value"), 'there is no edge "first.out" -> "sink.value"'),
     (c.SetParameter("first.size", 1), 'there is no "first.size": "first" has no parameter "size"; there are none'),
     (c.Rename("first", "second"), 'graph "chain" already has a node "second"; choose another name'),
     (c.Rename("first", "a/b"), '"/" separates the parts of a path'),
-    (c.Copy("first", "sink/x"), '"sink" is no subgraph, so nothing is inside it'),
+    (c.Copy("first", "sink/x"), '"sink" is not a subgraph, so nothing is inside it'),
     (c.Add("no_such_module:x", "x"), 'node "x": node type "no_such_module:x": no module named "no_such_module"'),
     (c.Add("hfg.testing.nodes:doubel", "x"), 'module "hfg.testing.nodes" has no "doubel"'),
     (c.Add("hfg.testing.nodes:double", "x", {"size": 3}), 'node "x": double has no parameter "size"'),
     (c.Add("hfg.testing.nodes:double", "x", {}, {"rate": 3}), "options are those of graph.add"),  # type: ignore[typeddict-unknown-key]
     (c.Replace("first", "hfg.testing.nodes:sink"), 'which has no output "out", and that is in use'),
     (c.Move("first", "gpu"), "which is not declared"),
-    (c.Dissolve("first"), '"first" is no subgraph, so it cannot be dissolved'),
+    (c.Dissolve("first"), '"first" is not a subgraph, so it cannot be dissolved'),
     (c.Enclose((), "box"), "made of at least one node"),
     (c.Enclose(("first",), "second"), "has a node of this name already"),
     ("remove first", "an edit takes commands"),
@@ -750,7 +750,7 @@ REFUSED = [
     (c.SetEdge("second.out", "sink.value", through=(ops.skip(1),)), "a command says operators by name, got"),  # type: ignore[arg-type]
     (
         c.Connect("start", "sink.activate", through=(c.Operator("skip"),)),
-        '"start" -> "sink.activate": "skip" is no reference to an operator; write "my_robot.operators:smoothed"',
+        '"start" -> "sink.activate": "skip" is not a reference to an operator; write "my_robot.operators:smoothed"',
     ),
     (
         c.Connect("start", "sink.activate", through=(c.Operator("os:getcwd"),)),
@@ -781,18 +781,18 @@ REFUSED = [
     (c.RemoveGroup("loop"), 'group "loop" is the event loop itself and is always there'),
     (c.RemoveGroup("gone"), 'there is no group "gone"'),
     (c.RemoveGroup(["busy"]), "RemoveGroup takes name as a text, got ['busy']"),  # type: ignore[arg-type]
-    (c.AddInput("in", "lost[int]"), 'input "in" of the graph: "lost[int]" is no type (there is no lost)'),
-    (c.AddInput("in", "f()"), 'input "in" of the graph: "f()" is no type (what is f()?)'),
-    (c.AddInput("in", "[int"), 'input "in" of the graph: "[int" is no type ('),
-    (c.AddInput("in", "no_such_module.Thing"), "is no type (there is no no_such_module.Thing)"),
-    (c.AddInput("in", f"Literal[{'-' * 10_000}1]"), f'"Literal[{"-" * 192}" is no type ('),
+    (c.AddInput("in", "lost[int]"), 'input "in" of the graph: "lost[int]" is not a type (there is no lost)'),
+    (c.AddInput("in", "f()"), 'input "in" of the graph: "f()" is not a type (what is f()?)'),
+    (c.AddInput("in", "[int"), 'input "in" of the graph: "[int" is not a type ('),
+    (c.AddInput("in", "no_such_module.Thing"), "is not a type (there is no no_such_module.Thing)"),
+    (c.AddInput("in", f"Literal[{'-' * 10_000}1]"), f'"Literal[{"-" * 192}" is not a type ('),
     (c.AddInput("in", "os.sep"), 'the type of input "in" is'),
     (c.AddInput("in", int), 'AddInput takes type as a text such as "int", got'),  # type: ignore[arg-type]
     (c.AddOutput("start", "int"), 'graph "chain" has a port "start" already; choose another name'),
     (c.AddSubgraph("box", {"a b": "int"}), "subgraph \"box\": a port cannot be called 'a b'; choose another name"),
     (c.AddSubgraph("box", {"graph": "int"}), "subgraph \"box\": a port cannot be called 'graph'"),
     (c.AddSubgraph("box", {"a": "int"}, {"a": "int"}), 'subgraph "box": it has two ports "a"'),
-    (c.AddSubgraph("box", {"a": "itn"}), 'subgraph "box": port "a": "itn" is no type (there is no itn)'),
+    (c.AddSubgraph("box", {"a": "itn"}), 'subgraph "box": port "a": "itn" is not a type (there is no itn)'),
     (c.AddSubgraph("box", {"a": 3}), 'subgraph "box": port "a": a type is given as a text, got 3'),  # type: ignore[dict-item]
     (c.AddSubgraph("first"), 'graph "chain" has a node "first" already'),
     (c.AddSubgraph("box", {}, {}, {}, {}, {"rate": 3}), "options are those of graph.add"),  # type: ignore[typeddict-unknown-key]
@@ -842,7 +842,7 @@ def test_the_inside_is_edited_with_the_whole_graph() -> None:
     "data", ["", "{}", '[{"do":"Explode"}]', '[{"do":"Remove"}]', '[{"do":"Remove","path":3}]', b"\xff"]
 )
 def test_what_is_no_list_of_commands_says_so(data: str) -> None:
-    with pytest.raises(GraphError, match="this is no list of commands"):
+    with pytest.raises(GraphError, match="this is not a list of commands"):
         c.decode(data)
 
 

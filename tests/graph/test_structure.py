@@ -271,7 +271,7 @@ def test_path_leads_to_the_ports_of_the_whole(graph: Graph) -> None:
         ("map_lokup", 'did you mean "map_lookup"?'),
         ("inside/dubble", '"inside" has no node "dubble"; did you mean "double"?'),
         ("map_lookup.unkown", 'has no port "unkown"; did you mean "unknown"?'),
-        ("map_lookup/x", '"map_lookup" is no subgraph'),
+        ("map_lookup/x", '"map_lookup" is not a subgraph'),
         ("nothing/like/it", 'there are "map_lookup", "inside"'),
     ],
 )

@@ -207,7 +207,7 @@ def test_promotions_that_cannot_be_are_refused(graph: Graph) -> None:
     slow, limit = inner.ports.parameters["slow"], follow.graph.nodes["plan"].ports.parameters["limit"]
     with pytest.raises(GraphError, match="promoted already"):
         follow.graph.promote(follow.speed, limit)
-    with pytest.raises(GraphError, match="no parameter of the subgraph"):
+    with pytest.raises(GraphError, match="not a parameter of the subgraph"):
         graph.promote(follow.speed, slow)
     with pytest.raises(GraphError, match="not in the graph inside"):
         follow.graph.promote(follow.speed, Plan().ports.parameters["slow"])
@@ -259,7 +259,7 @@ def test_iterating_subgraph_takes_collections_and_gives_lists(graph: Graph) -> N
 def test_iteration_may_be_said_when_adding(graph: Graph) -> None:
     follow, lists = graph.add(FollowPerson(), iterate_over=["person"]), graph.add(Lists())
     graph.connect(lists.many, follow.ports.inputs["person"])
-    with pytest.raises(GraphError, match='names "persn", which is no input; did you mean "person"'):
+    with pytest.raises(GraphError, match='names "persn", which is not an input; did you mean "person"'):
         graph.add(FollowPerson(), iterate_over=["persn"])
     assert list(graph.nodes) == ["follow_person", "lists"]
 

@@ -61,7 +61,7 @@ def test_a_path_may_name_the_ports_of_the_graph_and_inner_sides() -> None:
         ("src.oot", "box.data", 'there is no "src.oot": "src" has no port "oot"; did you mean "out"?'),
         ("scr.out", "box.data", 'there is no "scr.out": graph "lines" has no node "scr"; did you mean "src"?'),
         ("src", "box.data", '"src" is no port; name a port of a node, as in "src.name"'),
-        ("src.out", "box.data.outer", 'there is no "box.data.outer": behind a port only ".inner" may follow'),
+        ("src.out", "box.data.outer", 'there is no "box.data.outer": only ".inner" may follow a port'),
         (
             "src.out",
             "sink.value.inner",

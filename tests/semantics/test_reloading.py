@@ -98,7 +98,7 @@ def test_a_module_that_fails_leaves_the_run_as_it_was_and_can_be_tried_again(sou
     async def body(run: hfg.Run) -> None:
         await asyncio.sleep(0.002)
         write(source, "def helper(:")
-        with pytest.raises(GraphError, match="invalid syntax in line 1 of .*the graph goes on with what it has"):
+        with pytest.raises(GraphError, match="invalid syntax in line 1 of .*the graph keeps its nodes"):
             await run.reload("growing")
         await asyncio.sleep(0.02)
         write(source, SOURCE.replace("* self.by", "* self.by + 5"))

@@ -328,7 +328,7 @@ def test_what_is_said_of_a_target_is_what_happens_at_the_drop() -> None:
                 elif fit["fit"] == "refused":
                     assert answer["message"].endswith(fit["message"])
                 else:  # only the whole shows it: a circle in which nothing could ever fire
-                    assert answer["message"].startswith("the edit is refused, for it would break the graph"), target
+                    assert answer["message"].startswith("the edit is refused because it would break the graph"), target
 
     live(main)
 

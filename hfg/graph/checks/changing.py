@@ -1,6 +1,6 @@
 """Node types whose code changes what it takes (rule T1): read from the source of their process functions.
 
-What is bound again in the function may be a copy and is left alone. Depends on `flat`.
+Names that the function rebinds may refer to copies and are ignored. Depends on `flat`.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def changed_inputs(whole: FlatGraph) -> list[Problem]:
 
 
 def _found_in(node: FlatNode) -> list[Problem]:
-    """What is to be told of the type of a node: the first input that its code writes into."""
+    """Return the problem of a node's type: the first input that its code writes into."""
     kind = node.node._type
     if kind.process_kind == "none":
         return []
@@ -61,7 +61,7 @@ def _found_in(node: FlatNode) -> list[Problem]:
 
 
 def _function(node: Node) -> Callable[..., Any] | None:
-    """What runs for a firing, if it was written in Python."""
+    """Return the function that runs for a firing, if it was written in Python."""
     kind = node._type
     found = inspect.unwrap(kind.origin.function) if kind.is_function else getattr(type(node), "process", None)
     return found if inspect.isfunction(found) else None

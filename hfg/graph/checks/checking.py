@@ -1,6 +1,6 @@
 """What only the whole shows: every check is a function over the flat graph that gives what it finds.
 
-An error keeps the graph from running as its structure says; warnings and hints are told and the graph runs. Floors
+An error keeps the graph from running as its structure says; warnings and hints are reported and the graph runs. Layers
 above add their own with `also`. Depends on `flat`, `edges`, `flow` and `nodes`.
 """
 

@@ -19,7 +19,7 @@ __all__ = ["borders", "joined_edges", "promotions", "unseen_parameters"]
 
 
 def joined_edges(flat: FlatGraph) -> Iterator[Problem]:
-    """What the parts of an edge through subgraphs say must fit the whole edge (rules P2, P3, P4, P7)."""
+    """The options of each part of an edge through subgraphs must fit the whole edge (rules P2, P3, P4, P7)."""
     into: dict[Any, FlatEdge] = {}
     pairs: dict[Any, FlatEdge] = {}
     for edge in flat.edges:
@@ -43,7 +43,7 @@ def _options_of_parts(edge: FlatEdge) -> Iterator[Problem]:
         yield Problem(
             path=edge.label,
             severity="error",
-            what=f"{said.options.first_said('events')} is said on {said.label}, a part of it",
+            what=f"{said.options.first_said('events')} is set on {said.label}, a part of it",
             why="it comes from an output, and such an edge holds one token and no queue (rule P4)",
             remedy="leave it out, or send by an event",
             check="queue-on-data",
@@ -53,7 +53,7 @@ def _options_of_parts(edge: FlatEdge) -> Iterator[Problem]:
         yield Problem(
             path=edge.label,
             severity="error",
-            what=f"buffer={buffered.options.buffer} is said on {buffered.label}, a part of it",
+            what=f"buffer={buffered.options.buffer} is set on {buffered.label}, a part of it",
             why="it leads into a slot or comes from an event, and a buffer is for data into an input (rule P4)",
             remedy="leave it out, or send by an event and say capacity=",
             check="buffer-without-join",
@@ -112,7 +112,7 @@ def _parts(edge: FlatEdge) -> str:
 
 
 def borders(flat: FlatGraph) -> Iterator[Problem]:
-    """What iterates has no sources inside and takes neither signals nor activity (rule G4)."""
+    """An iterating subgraph has no sources inside and takes neither signals nor activity (rule G4)."""
     if flat.level.owner is not None:
         path = flat.level.path
         for node in flat.nodes:
@@ -157,7 +157,7 @@ def _refused(path: str, what: str, why: str, remedy: str) -> Problem:
 
 
 def promotions(whole: FlatGraph) -> list[Problem]:
-    """Edges to or from parameters of subgraphs that stand for nothing inside, and so are no edges (rule G1)."""
+    """Edges to or from parameters of subgraphs that stand for nothing inside, so nothing is connected (rule G1)."""
     problems = []
     for edge in _all_edges(whole):
         for port in (edge.source, edge.target):
@@ -177,7 +177,7 @@ def promotions(whole: FlatGraph) -> list[Problem]:
 
 
 def unseen_parameters(flat: FlatGraph) -> Iterator[Problem]:
-    """Edges that lead through a subgraph into a parameter whose new values nobody would see (rule P8)."""
+    """Edges that lead through a subgraph into a parameter whose new values no code would see (rule P8)."""
     for edge in flat.edges:
         target = edge.target
         if target.kind == "parameter" and target.port.node._type.given_parameters_once:

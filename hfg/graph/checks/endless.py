@@ -1,8 +1,8 @@
-"""Sources that certainly never end and never wait (rules F2, R6): what their code and the graph behind them show.
+"""Sources that certainly never end and never wait (rules F2, R6), by their code and the graph downstream.
 
 Only what is certain counts. A type is judged by the text of its process function: it may compute, write and trigger,
-and must not call, raise or import anything else. A source is left alone as soon as something behind it may take its
-time, for then its outputs or full queues hold it back, or may end the run. Depends on `flat`.
+and must not call, raise or import anything else. A source is not reported if a node downstream may take its time:
+its outputs or full queues then hold it back, or may end the run. Depends on `flat`.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def _neighbours(flat: FlatGraph) -> dict[int, list[int]]:
 
 
 def _is_held_back(flat: FlatGraph, source: FlatNode, behind: dict[int, list[int]], *, virtual: bool) -> bool:
-    """Whether something may take its time: a node behind the source, or one that joins it with something else."""
+    """Whether a node may take its time: one downstream of the source, or one that joins it with something else."""
     reached = {source.index}
     waiting = deque(reached)
     while waiting:

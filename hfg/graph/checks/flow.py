@@ -75,7 +75,7 @@ def unconnected_inputs(flat: FlatGraph) -> Iterator[Problem]:
 
 
 def unconnected_graph(flat: FlatGraph) -> Iterator[Problem]:
-    """Several nodes, and no edge at all: somebody has forgotten to connect them."""
+    """Several nodes, and no edge at all: the user has forgotten to connect them."""
     if len(flat.nodes) > 1 and not flat.edges and not flat.gates and flat.level.owner is None:
         if _lonely_inputs(flat) or all(node.node._type.process_kind == "none" for node in flat.nodes):
             return  # told of already: what they wait for, or that nothing leads to their slots
@@ -90,7 +90,7 @@ def unconnected_graph(flat: FlatGraph) -> Iterator[Problem]:
 
 
 def never_fires(flat: FlatGraph) -> set[int]:
-    """Return the nodes that certainly never fire: without process function, or behind an unconnected input."""
+    """Return the nodes that certainly never fire: without process function, or downstream of an unconnected input."""
     silent = {node.index for node in flat.nodes if node.node._type.process_kind == "none" and node.iteration is None}
     lonely = _lonely_inputs(flat)
     if lonely:
@@ -115,7 +115,7 @@ def _lonely_inputs(flat: FlatGraph) -> dict[int, list[str]]:
 
 
 def _data_neighbours(flat: FlatGraph) -> tuple[list[list[int]], list[list[int]]]:
-    """Who waits for the outputs of each node, and whose outputs it takes; of nodes that begin enabled."""
+    """Return the consumers of each node's outputs, and the producers of its inputs; of nodes that start enabled."""
     waits: list[list[int]] = [[] for _ in flat.nodes]
     feeds: list[list[int]] = [[] for _ in flat.nodes]
     for edge in flat.edges:
@@ -123,7 +123,7 @@ def _data_neighbours(flat: FlatGraph) -> tuple[list[list[int]], list[list[int]]]
         if edge.is_event_edge or source <= ROOT or target <= ROOT or edge.target.kind == "slot":
             continue
         if not (_begins_enabled(flat, source) and _begins_enabled(flat, target)):
-            continue  # such an edge is not live, so nobody waits for it
+            continue  # such an edge is not live, so its target does not wait for it
         feeds[target].append(source)
         if not edge.options.initial:
             waits[source].append(target)
@@ -136,7 +136,7 @@ def _begins_enabled(flat: FlatGraph, index: int) -> bool:
 
 
 def _reach(start: int, successors: list[list[int]]) -> list[int]:
-    """Who is behind a node, the nearest first, without itself."""
+    """Return the nodes downstream of a node, the nearest first, without itself."""
     found = {start: None}
     waiting = deque([start])
     while waiting:
@@ -176,7 +176,7 @@ def signal_rings(flat: FlatGraph) -> Iterator[Problem]:
 
 
 def _needs_firing(edge: FlatEdge) -> bool:
-    """Whether the event is triggered by firings alone; activity, errors and time bring automatic events without one."""
+    """Whether only firings trigger the event; activity, errors and time bring automatic events without a firing."""
     if edge.source.node < 0 or edge.source.kind != "event":
         return False
     return edge.source.name not in ("activated", "deactivated", "failed", "timeout")
@@ -214,7 +214,7 @@ def filling_rings(flat: FlatGraph) -> Iterator[Problem]:
                     path=f"{flat.nodes[source].path}.{event}",
                     severity="warning",
                     what=f"its signals come back {len(edges)} times, by {_listed(edges)}",
-                    why=f"if each is answered by another, the queues of the ring grow for ever (rule F8): "
+                    why=f"if each is answered by another, the queues of the ring grow forever (rule F8): "
                     f"{_circle(flat, shortest_ring(part, successors))}",
                     remedy='let one way suffice, or bound one of these edges by overflow="latest" or capacity_limit=',
                     check="filling-ring",
@@ -222,7 +222,7 @@ def filling_rings(flat: FlatGraph) -> Iterator[Problem]:
 
 
 def waiting_rings(flat: FlatGraph) -> Iterator[Problem]:
-    """Rings in which nodes may wait for each other behind full queues, and where the capacity that spares them that.
+    """Rings whose nodes may wait for each other because queues are full, and where more capacity would prevent that.
 
     A ring in which each signal makes at most one more is harmless: its queues fill only with what comes from outside.
     """
@@ -245,8 +245,8 @@ def waiting_rings(flat: FlatGraph) -> Iterator[Problem]:
                 severity="hint",
                 what=f"signals go round, and one firing or call may trigger many of them: {circle}",
                 why=f"when {often[0].options.capacity} lie there its node waits, and where the others wait for it the "
-                "queue grows (rule F8); how many there may be nobody can tell from outside",
-                remedy="say capacity= as many as may be on their way at once and one more, and it need not grow; or "
+                "queue grows (rule F8); how many there may be cannot be seen from outside",
+                remedy="set capacity= to one more than may be in transit at once, and it need not grow; or "
                 "bound it by capacity_limit=",
                 check="waiting-ring",
             )
@@ -283,7 +283,7 @@ def _may_trigger_often(flat: FlatGraph, edge: FlatEdge) -> bool:
 
 
 def _has_loop(code: CodeType) -> bool:
-    """Return whether it jumps back, but for an await, which jumps itself, and in Python 3.12 behind its clean-up."""
+    """Return whether it jumps back, other than for an await, which jumps too, in Python 3.12 after its clean-up."""
     names = ["", *(instruction.opname for instruction in dis.get_instructions(code))]
     return any(
         "JUMP_BACKWARD" in name and not name.endswith("NO_INTERRUPT") and before != "CLEANUP_THROW"
@@ -338,7 +338,7 @@ def _never_triggered(flat: FlatGraph, edge: FlatEdge) -> tuple[str, str] | None:
 
 
 def unfed_slots(flat: FlatGraph) -> Iterator[Problem]:
-    """Nodes that live by their slots alone, to none of which anything leads."""
+    """Nodes that work only when their slots are called, if no edge leads to any of these slots."""
     fed = {edge.target.node for edge in flat.edges if edge.target.kind == "slot"}
     for node in flat.nodes:
         kind = node.node._type
@@ -372,7 +372,7 @@ def endless_sources(flat: FlatGraph) -> Iterator[Problem]:
 
 
 def _successors(flat: FlatGraph, edges: Iterable[FlatEdge]) -> list[list[int]]:
-    """Return the nodes that wait for each node; what holds an initial token, or leads into a slot, holds nobody up."""
+    """Return the nodes that wait for each node. Edges with initial tokens or into slots make no node wait."""
     successors: list[list[int]] = [[] for _ in flat.nodes]
     for edge in edges:
         source, target = edge.source.node, edge.target.node

@@ -35,7 +35,7 @@ __all__ = [
 
 
 def unknown_groups(flat: FlatGraph) -> Iterator[Problem]:
-    """Nodes in groups that nobody declared."""
+    """Nodes in groups that are not declared."""
     for path, node, options in _members(flat):
         group = options.group
         # Told where the group is named, not again for all that inherit it.
@@ -234,7 +234,7 @@ def _names_of(node: Node) -> list[str]:
 
 
 def _known_names(cls: type) -> set[str]:
-    """The attributes of a class and all names in its methods; what else may be reached nobody can tell."""
+    """The attributes of a class and all names in its methods; other ways to reach an attribute cannot be seen."""
     known: set[str] = set()
     for one in cls.__mro__[: cls.__mro__.index(Node)]:
         known.update(vars(one), getattr(one, "__annotations__", ()))
@@ -263,7 +263,7 @@ def concurrent_firings(flat: FlatGraph) -> Iterator[Problem]:
     for node in concurrent:
         count, group = node.options.concurrency, flat.groups.get(node.options.group or "loop")
         if group is None:
-            continue  # which is told by another check
+            continue  # another check reports it
         what = remedy = ""
         if group.threads and count > group.threads:
             what = f'concurrency={count}, but its group "{group.name}" has threads={group.threads}'
@@ -318,7 +318,7 @@ def unused_scheduling(whole: FlatGraph) -> Iterator[Problem]:
                 yield Problem(
                     path=paths[0],
                     severity="hint",
-                    what=f'{option} is said here{_more(len(paths) - 1)}, but the policy of group "{name}" is '
+                    what=f'{option} is set here{_more(len(paths) - 1)}, but the policy of group "{name}" is '
                     f'"{group.policy}"',
                     why=f'only policy "{policy}" looks at it (rule R2)',
                     remedy=f'declare graph.group("{name}", policy="{policy}"), or leave {option} out',

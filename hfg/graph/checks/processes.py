@@ -22,7 +22,7 @@ def process_borders(flat: FlatGraph) -> Iterator[Problem]:
     yield from _rings_across(flat, {edge.edge.index for edge in cutting.edges})
     for edge in cutting.edges:
         if edge.hint is Failure:
-            continue  # which is told as sentences, with what can cross of the values
+            continue  # it crosses as text, with those of its values that can cross
         reason = wire_problem(edge.hint)
         if reason is not None:
             where = f'group "{edge.target}"' if edge.target != MAIN else "the main process"

@@ -70,8 +70,8 @@ def view_of(
     """Check what the user wants to see.
 
     Raises:
-      GraphError: a node is not in the graph, or one that is no subgraph is to be folded.
-      UsageError: something else is none of its kind.
+      GraphError: a node is not in the graph, or a node to fold is not a subgraph.
+      UsageError: another argument is invalid.
     """
     level = level_of(graph)
     if depth is not None and (type(depth) is not int or depth < 0):
@@ -109,7 +109,7 @@ def _nodes(level: Level, what: str, given: Iterable[Node | str]) -> list[Node]:
 
 # --- Mermaid ---
 
-# What means something inside of quotes; `#name;` is how Mermaid writes an entity.
+# Characters that have a meaning inside quotes; `#name;` is how Mermaid writes an entity.
 _ENTITIES: Final = str.maketrans(
     {
         "#": "#35;",
@@ -117,7 +117,7 @@ _ENTITIES: Final = str.maketrans(
         "<": "#lt;",
         ">": "#gt;",
         "&": "#amp;",
-        "\\": "#92;#8203;",  # with what is not seen, or Mermaid takes the n behind it for the end of a line
+        "\\": "#92;#8203;",  # with an invisible character; otherwise Mermaid takes a following n for a line break
         "`": "#96;",
         "\n": "<br/>",
         "\r": " ",

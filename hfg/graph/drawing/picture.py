@@ -1,8 +1,8 @@
-"""What is to be seen of a graph: boxes, shapes and arrows, before anybody has chosen a format.
+"""The visible parts of a graph: boxes, shapes and arrows, in no particular format.
 
 Edges are drawn as they were connected; the ports of subgraphs, and those of the whole graph, are shapes of their own,
-so an arrow never begins or ends at a box. What lies in a folded subgraph is not seen, and whatever leads there leads to
-the subgraph. Nothing recurses: graphs may be as deep as they like. Depends on `structure`; changes nothing there.
+so an arrow never begins or ends at a box. The content of a folded subgraph is not shown; its edges end at the
+subgraph. Nothing recurses: graphs may be as deep as they like. Depends on `structure`; changes nothing there.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from hfg.ports import InnerSource, InnerTarget, Port
 
 __all__ = ["picture"]
 
-_LAST: Final = 1_000_000  # ports that every node has are behind its own
+_LAST: Final = 1_000_000  # ports that every node has come after its own
 
 
 def picture(graph: HasLevel, view: View = EVERYTHING) -> Picture:
-    """Look at a graph, or at the inside of a subgraph alone."""
+    """Return the picture of a graph, or of only the inside of a subgraph."""
     return _Look(level_of(graph), view).picture
 
 
@@ -74,7 +74,7 @@ class _Look:
             if id(port) in used or port.kind in ("input", "output"):
                 look: Look = "start" if port is ports.start else "stop" if port.kind == "slot" else "port"
                 self._shape(0, port, port.name, look, port.kind)
-        for port, name in self.on_boxes.get(self.level.owner, {}).items():  # the inside of a subgraph, drawn alone
+        for port, name in self.on_boxes.get(self.level.owner, {}).items():  # the inside of a subgraph, drawn by itself
             self._port_of_box(0, port, name)
 
     def _nodes(self) -> None:
@@ -255,7 +255,7 @@ def _depth_first(level: Level) -> Iterator[Level]:
 
 
 def _ports_of_boxes(edges: Iterable[Edge]) -> dict[Any, dict[Any, str]]:
-    """Give, for each subgraph, its ports that an edge leads to or from, outside or inside, with their names."""
+    """Return for each subgraph its ports that have an edge outside or inside, with their names."""
     found: dict[Any, dict[Any, str]] = {}
     for edge in edges:
         for end in (edge.source, edge.target):

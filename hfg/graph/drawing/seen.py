@@ -16,19 +16,19 @@ Look: TypeAlias = Literal["node", "box", "port", "start", "stop", "feed"]
 
 
 class View(msgspec.Struct, frozen=True):
-    """What the user wants to see of a graph.
+    """Which parts of a graph to show.
 
     Attributes:
       kind: "activity" shows states and what feeds them, "mission" all with data in bundles, "all" every edge by itself.
         None: "mission" if activity moves between nodes of the level, else "all".
-      depth: so many subgraphs inside each other are open, all others folded; None opens all.
+      depth: number of levels of subgraphs that are open; all others are folded. None opens all.
       folded: these subgraphs are, whatever the depth.
       opened: the subgraphs with these paths are open, whatever the depth.
       active: these nodes and subgraphs are shown as active; None: those that are, in a run.
       all_ports: ports are shown that nothing is connected to, too.
       measured: nodes have room for bars and figures.
       places: upper left corners of nodes that the user has chosen, by path; they are kept.
-      only: these paths alone are placed, around all others, which stay at their places.
+      only: place only these paths, around all others, which stay at their places.
     """
 
     kind: Kind | None = None
@@ -66,7 +66,7 @@ class Shape(msgspec.Struct):
     Attributes:
       id: "n0", "n1", ... in order of appearance; "g0", ... of boxes.
       name: as users wrote it.
-      details: what else is said about it, a line each.
+      details: its options, one per line.
       path: of the node; "" for ports.
       type_name: of the node, or what kind of port it is.
       group: where the node runs.
@@ -111,12 +111,12 @@ class Arrow(msgspec.Struct):
       label: its ports, as far as they need a name, and its options.
       out_of: the port of the node at which it begins; None if the shape is the port.
       into: the same for its end.
-      said: its options alone.
+      said: only its options.
       is_signal: it begins at an event.
       is_active: it transports activity: the double line of the paper.
       is_gate: it is no edge; the tail is the state, the head what rests meanwhile.
       is_back: initial tokens lie on it, with which a circle of data begins.
-      ends: the paths of both ports; of a gate those of who opens it and who rests.
+      ends: the paths of both ports; of a gate, the paths of its state node and of the gated node.
     """
 
     tail: str
@@ -136,7 +136,7 @@ class Picture(msgspec.Struct):
     """Everything to draw.
 
     Attributes:
-      items: all shapes, each with its depth, the content of a box behind it.
+      items: all shapes, each with its depth; the content of a box follows the box.
       groups: all groups of the graph in their order.
     """
 

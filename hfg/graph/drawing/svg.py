@@ -135,7 +135,7 @@ def _node(node: NodeBox, laid: Layout) -> Iterator[str]:
 
 
 def _told(node: NodeBox) -> str:
-    """What is said when one points at it: the whole name, and whatever the drawing shows by a sign or a colour."""
+    """Return the tooltip: the whole name, and whatever the drawing shows by a sign or a colour."""
     lines = [node.id if node.kind != "wire" else node.name, node.type_name, *node.details]
     lines += [_says(badge) for badge in node.badges]
     if node.kind != "wire":
@@ -224,7 +224,7 @@ def _net(lines: Sequence[Line], view: str) -> Iterator[str]:
     for is_bundle, d in strokes.items():
         if d:
             yield f'<path class="{classes}{" hfg-bundle" if is_bundle else ""}" d="{d}"/>'
-    if active:  # two lines, for there is canvas between them
+    if active:  # two lines, because there is canvas between them
         yield f'<path class="hfg-gap" d="{strokes[False]}"/>'
     shade = classes.replace("hfg-line", "hfg-tip")
     for x, y in (dot for line in lines for dot in line.dots):
@@ -294,7 +294,7 @@ def _within(way: Sequence[Point]) -> list[Point]:
 
 
 def _on_line(line: Line) -> Iterator[str]:
-    """Draw labels on a line or at its end: the number of a bundle, what is said, a tag."""
+    """Draw labels on a line or at its end: the number of a bundle, the options, a tag."""
     if line.count_at is not None:
         x, y = line.count_at
         yield f'<rect class="hfg-pill" x="{_n(x - 9)}" y="{_n(y - 8)}" width="18" height="16" rx="8"/>'

@@ -1,7 +1,7 @@
 """Texts in drawings: how wide they are, how they are shortened, and that none of them breaks what is around it.
 
-Nobody can be asked how wide a font is where a drawing is made, so the widths are those of Inter, roughly; Arial,
-Helvetica and Liberation Sans are narrower. What is in no table is held in its place by `textLength`, see `svg`.
+The widths of the reader's font are not known when a drawing is made, so they are roughly those of Inter; Arial,
+Helvetica and Liberation Sans are narrower. `textLength` keeps characters in place that are in no table; see `svg`.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def _visible(text: str) -> str:
 
 
 def _as_seen(character: str) -> str:
-    """Replace controls and what XML 1.0 forbids; marks of direction would turn round what is written behind them."""
+    """Replace controls, characters that XML 1.0 forbids, and marks of direction, which would reverse later text."""
     if character in "\n\t":
         return character
     category = unicodedata.category(character)

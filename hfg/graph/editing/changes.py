@@ -1,4 +1,4 @@
-"""What a command does to a graph, in steps that can each be taken back exactly (rule R4).
+"""The steps in which a command changes a graph; each can be undone exactly (rule R4).
 
 A change holds the nodes and edges themselves, with their places in the order, so that undoing restores the same objects
 at the same places: a run recognises them by identity, and keeps the tokens on them. A change was checked before it is
@@ -271,7 +271,7 @@ class GroupsChange(Change):
 
 @dataclass(eq=False)
 class PortChange(Change):
-    """A port of the whole graph is declared (`added`) or is none any more; always the last one of its kind."""
+    """A port of the whole graph is declared (`added`) or removed; always the last one of its kind."""
 
     level: Level
     port: GraphInput[Any] | GraphOutput[Any]

@@ -1,4 +1,4 @@
-"""What all commands have in common, and commands as JSON (rule R4). `commands` has the commands themselves."""
+"""The base of all commands, and commands as JSON (rule R4). `commands` has the commands themselves."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def read(data: str | bytes) -> Sequence[Command]:
     try:
         return _decoder().decode(data)
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-        raise GraphError(f"this is no list of commands: {error}") from error
+        raise GraphError(f"this is not a list of commands: {error}") from error
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""Edits of a graph as data: what is to change, by paths and references alone (rule R4).
+"""Edits of a graph as data: what is to change, expressed only by paths and references (rule R4).
 
 A command can be logged, sent over a wire and carried out again: `encode` and `decode`. It says what, never how:
 `performing` carries it out on a graph, `transactions` undoes it, and a run follows. Depends on errors.
@@ -78,7 +78,7 @@ class Add(Command, frozen=True):
 
 
 class AddSubgraph(Command, frozen=True):
-    """Add an empty subgraph that has no type of its own, such as `Enclose` makes; what is inside is added behind it.
+    """Add an empty subgraph without a type of its own, such as `Enclose` makes; later commands add its content.
 
     Attributes:
       path: where, and how it is called there.
@@ -192,7 +192,7 @@ class Operator(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_def
 
 
 class EdgeSaid(EdgeFields, kw_only=True):
-    """What is said of an edge as data; operators by their names."""
+    """The options of an edge as data; operators by their names."""
 
     through: tuple[Operator, ...] = ()
 
@@ -306,7 +306,7 @@ class Note(Command, frozen=True):
 
 
 class Enclose(Command, frozen=True):
-    """Group nodes of one graph into a new subgraph beside them, which is called `name` (rule G1)."""
+    """Group nodes of one graph into a new subgraph of this graph, which is named `name` (rule G1)."""
 
     paths: tuple[str, ...]
     name: str

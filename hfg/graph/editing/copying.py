@@ -22,7 +22,7 @@ def copy_of(node: Node, around: Level) -> tuple[Node, Level | None]:
     """Return a node of the same type and parameters that is in no graph, and for a subgraph a copy of its inside."""
     copies: dict[object, Node] = {}
     first = copies[node] = node._copy()
-    set_options(first, node._options)  # by which an end of it shows whether it takes one edge alone
+    set_options(first, node._options)  # they decide whether an input takes only one edge
     waiting = [(node, first, around)]
     levels: list[tuple[Level, Level]] = []
     boxes: list[tuple[Node, Level]] = []
@@ -67,4 +67,4 @@ def _end(end: End, copies: dict[object, Node]) -> End:
         found = relay.inner
     elif isinstance(end, Port) and end.node in copies:
         found = same_port(copies[end.node], end)
-    return cast(End, found)  # of the same kind, for the nodes are of the same type
+    return cast(End, found)  # of the same kind, because the nodes have the same type

@@ -1,4 +1,4 @@
-"""What is said of an edge as plain data, and back: commands and graph files say it in the same words.
+"""The options of an edge as plain data, and back; commands and graph files use the same format.
 
 Values on an edge and what operators are given become data; operators go by the names of their functions.
 """
@@ -21,7 +21,7 @@ Convert: TypeAlias = Callable[[Any, Any], Any]
 
 
 def edge_as_data(edge: Edge, encode: Convert) -> EdgeGiven[Any, Operator]:
-    """Return what is said of an edge.
+    """Return the options of an edge.
 
     Raises:
       GraphError: an operator has no name, or a value is not plain data; the message does not name the edge.
@@ -31,7 +31,7 @@ def edge_as_data(edge: Edge, encode: Convert) -> EdgeGiven[Any, Operator]:
         try:
             said["initial"] = tuple(encode(one, type_of(edge.target)) for one in said["initial"])
         except EncodingError as error:
-            raise GraphError(f"an initial value is no plain data: {error}; take another") from error
+            raise GraphError(f"an initial value is not plain data: {error}; use another") from error
     if "through" in said:
         said["through"] = tuple(_operator_as_data(one, encode) for one in said["through"])
     return said
@@ -54,7 +54,7 @@ def _operator_as_data(operator: object, encode: Convert) -> Operator:
 def edge_as_meant(
     said: EdgeGiven[Any, Operator], target: TargetEnd, where: str, decode: Convert
 ) -> EdgeGiven[Any, NamedOperator]:
-    """Return the options that are said of an edge; what is not even a list is refused with the edge.
+    """Return the options that an edge is given; an error names the edge if a value is not even a list.
 
     Raises:
       GraphError: an operator is not said by name, or cannot be made; the message begins with `where`.

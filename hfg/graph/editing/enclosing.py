@@ -1,4 +1,4 @@
-"""Grouping nodes into a subgraph and dissolving one, so that nobody else can tell (rule G1).
+"""Grouping nodes into a subgraph and dissolving one, without any effect on other nodes (rule G1).
 
 Each edge over the border gets a port of its own, in order, so that what a node sends keeps its order. Depends on
 `changes`, `queue_conflicts` and levels.
@@ -34,7 +34,7 @@ End: TypeAlias = SourceEnd | TargetEnd
 
 
 def enclose(do: Do, members: Sequence[Node], name: str) -> None:
-    """Put nodes of one graph into a new subgraph beside them.
+    """Put nodes of one graph into a new subgraph of this graph.
 
     Raises:
       GraphError: the nodes are not of one graph, the name is taken, a parameter of them is promoted, or an edge would
@@ -99,7 +99,7 @@ def _refuse_promoted(around: Level, members: Sequence[Node]) -> None:
         for port in ports:
             if port.node in members:
                 raise GraphError(
-                    f'"{port.path}" stands behind the parameter "{name}" of "{around.path}", '
+                    f'"{port.path}" is set by the parameter "{name}" of "{around.path}", '
                     "so its node stays directly inside; group the others"
                 )
 
@@ -114,7 +114,7 @@ class _Names:
         for edge in crossing:
             inwards = owner_of(edge.target) in inner
             end = edge.target if inwards else edge.source
-            # of a vector each is a port of its own here, and so is the event beside an output
+            # each port of a vector is a port of its own here, and so is the event of an output
             plain = end.name.replace("[", "_").replace("]", "").replace(".", "_")
             wanted = plain if is_free(plain, box_type) else f"{plain}_port"
             name, number = wanted, 1
@@ -135,7 +135,7 @@ class _Names:
 
 
 def _outer_half(edge: Edge, box: Box, ports: _Names, inner: set[Node]) -> Edge | None:
-    """The part outside keeps what is said about the edge, for the outermost holds (rule G1)."""
+    """The part outside keeps the options of the edge, because those of the outermost part hold (rule G1)."""
     if edge not in ports.of:
         return None
     port = ports.port(edge, box)
@@ -161,8 +161,8 @@ def dissolve(do: Do, box: Node, levels: Sequence[Level]) -> None:
     """Put what is inside a subgraph in its place.
 
     Raises:
-      GraphError: it is no subgraph, something is said about the subgraph itself, a name inside is taken outside, or an
-        edge would have another queue.
+      GraphError: it is not a subgraph, it has options of its own, a name inside is taken outside, or an edge would
+        have another queue.
     """
     around, within = level_of(box.place.graph), _need_dissolvable(box, levels)
     border = _Border(box, around, within)
@@ -207,7 +207,7 @@ def _open_promotions(do: Do, box: Node, around: Level, within: Level) -> None:
 
 
 def _let_out(do: Do, box: Node, around: Level, within: Level) -> None:
-    """Let the nodes inside a subgraph stand where it stood; its group goes on with those that have none."""
+    """Put the nodes of a subgraph in its place; those without a group get the group of the subgraph."""
     position, group = around.members.position(box.place.name), box._options.group
     moves = [(node, node.place.name, node._options, inside(node)) for node in within.nodes.values()]
     for node in reversed(list(within.nodes.values())):
@@ -223,7 +223,7 @@ def _need_dissolvable(box: Node, levels: Sequence[Level]) -> Level:
     """Return what is inside a subgraph that can be dissolved."""
     path, within = box.place.path, inside(box)
     if within is None:
-        raise GraphError(f'"{path}" is no subgraph, so it cannot be dissolved; name a node that holds a graph')
+        raise GraphError(f'"{path}" is not a subgraph, so it cannot be dissolved; name a node that holds a graph')
     _refuse_if_named(box, levels)
     around = level_of(box.place.graph)
     for node in within.nodes.values():
@@ -236,7 +236,7 @@ def _need_dissolvable(box: Node, levels: Sequence[Level]) -> Level:
 
 
 def _refuse_if_named(box: Node, levels: Sequence[Level]) -> None:
-    """Refuse if something is said about the subgraph itself, which would have no place any more."""
+    """Refuse if the subgraph itself has options, which would be lost."""
     path = box.place.path
     for name, value in box._options.said().items():
         if name != "group":  # which the nodes inside get

@@ -1,8 +1,8 @@
 """Makes a graph of a document: the one way back from data, for files, commands and graphs sent to other processes.
 
 All nodes come first, level by level, then edges, promotions from the inside out, differences inside subgraphs, and
-gates, because any node may be gated by any other. What cannot be made is reported with its place in the document, and
-the rest is made all the same. Depends on `document`, `boxes` and `steps`.
+gates, because any node may be gated by any other. Parts that cannot be made are reported with their place in the
+document; the rest is made all the same. Depends on `document`, `boxes` and `steps`.
 """
 
 from __future__ import annotations
@@ -195,7 +195,7 @@ class Builder:
     # --- edges and promotions ---
 
     def _missing(self, part: _Part) -> Set[str]:
-        """Return the names of nodes that could not be made, which was reported; so nothing more is said about them."""
+        """Return the names of nodes that could not be made, which was reported and is not reported again."""
         names = (*part.box.nodes, *self.lost(part.key))
         return {name for name in names if name not in part.level.nodes}
 

@@ -1,4 +1,4 @@
-"""Carries commands out on a graph: all of an edit or nothing, because a refused command takes back those before it.
+"""Carries commands out on a graph: all of an edit or nothing, because a refused command undoes those before it.
 
 Resolves the paths in commands; `steps` does the work. A running graph is edited in the same way, and the run follows.
 """
@@ -230,7 +230,7 @@ class _Interpreter:
         promoted = around.promotions.copied()
         standing = promoted.get(outer.name, []) if around.owner is outer.node else []
         if inner not in standing:
-            raise GraphError(f'"{outer.path}" does not stand for "{inner.path}", so there is nothing to take back')
+            raise GraphError(f'"{outer.path}" does not stand for "{inner.path}", so there is nothing to undo')
         rest = [port for port in standing if port is not inner]
         self.steps.set_promotions(around, promoted | {outer.name: rest})
 

@@ -1,7 +1,7 @@
 """Hot reload: the types of a changed module replace those of its nodes (rule R4).
 
-The source runs in a new module, so that code under way, and old types as long as somebody has them, go on with the old
-one. If anything about it fails, all is as before. Depends on `commands`; whoever carries the commands out keeps
+The source runs in a new module, so that code in progress, and old types that are still in use, continue with the old
+one. If anything about it fails, all is as before. Depends on `commands`; the code that carries them out keeps
 parameters, edges and gates.
 """
 
@@ -81,7 +81,7 @@ class _Reloaded(ModuleType):
 
 
 def _newest(module: ModuleType) -> ModuleType:
-    """The module of this name; itself if somebody has put it back or taken all away."""
+    """Return the current module of this name, or this one if there is none."""
     return sys.modules.get(object.__getattribute__(module, "__name__"), module)
 
 
@@ -91,7 +91,7 @@ def _run(code: CodeType, module: ModuleType) -> None:
     except (Exception, SystemExit) as error:
         raise GraphError(
             f'module "{module.__name__}" cannot be reloaded: running it failed ({type(error).__name__}: {error}); '
-            "the graph goes on with what it has"
+            "the graph keeps its nodes"
         ) from error
 
 
@@ -138,4 +138,4 @@ def _compiled(module: ModuleType) -> CodeType:
 
 
 def _cannot(module: ModuleType, why: str) -> GraphError:
-    return GraphError(f'module "{module.__name__}" cannot be reloaded: {why}; the graph goes on with what it has')
+    return GraphError(f'module "{module.__name__}" cannot be reloaded: {why}; the graph keeps its nodes')

@@ -69,7 +69,7 @@ class Steps:
         self.changes.append(change)
 
     def take_back(self, count: int = 0) -> None:
-        """Take back all changes after the first `count`."""
+        """Undo all changes after the first `count`."""
         undo_all(self.changes[count:])
         del self.changes[count:]
 
@@ -157,7 +157,7 @@ class Steps:
         self.do(EdgeChange.of(level, edge, added=False))
 
     def redeclare(self, level: Level, edge: Edge, said: EdgeGiven[Any, Any]) -> None:
-        """Change options of an edge. Options that stay the same are no change, which a run could not follow."""
+        """Change options of an edge. An option that stays the same is left out: a run could not follow that change."""
         where = f'"{edge.label}"'
         options = edge_as_meant(said, edge.target, where, partial(as_meant, find=self.find))
         checked = edge_options(lambda: where, msgspec.structs.asdict(edge.options) | options)

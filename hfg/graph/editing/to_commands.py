@@ -29,7 +29,7 @@ def as_commands(level: Level) -> list[c.Command]:
     """
     if level.owner is not None:
         raise GraphError(
-            f'{level.title} is told with the whole graph: write graph.as_commands() of "{level.whole.root.name}"'
+            f'{level.title} is described with the whole graph: write graph.as_commands() of "{level.whole.root.name}"'
         )
     document = _Describer(level).document()
     root = Level(level.name, Whole(level.whole.make_face, level.whole.box_type))

@@ -149,7 +149,7 @@ def refuse_new_errors(before: Sequence[Problem], after: Sequence[Problem]) -> No
         known[problem.check] -= 1
         if known[problem.check] < 0:
             new = next((one for one in after if one.check == problem.check and one not in before), problem)
-            raise GraphError(f"the edit is refused, for it would break the graph: {new}")
+            raise GraphError(f"the edit is refused because it would break the graph: {new}")
 
 
 def _need_rest(graph: HasLevel, what: str) -> None:

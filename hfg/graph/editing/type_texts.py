@@ -1,6 +1,6 @@
 """Types as text, "list[my_robot.types.Pose]", for commands that declare ports; and back.
 
-A class is called by its module and name, those of Python by their name alone. Depends on errors.
+A class is named by its module and name, a class of Python only by its name. Depends on errors.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def _name_of_class(kind: type) -> str | None:
 def _name_of_alias(hint: object) -> str | None:
     """The name that a module has given to a type that has none of its own, such as an array of a shape.
 
-    One that is equal is as good: which of several equal ones `typing` gives out depends on what was imported before.
+    An equal type is as good: which of several equal ones `typing` returns depends on what was imported before.
     """
     equal: str | None = None
     for name, module in list(sys.modules.items()):
@@ -66,7 +66,7 @@ def type_of_text(text: str, where: str) -> Any:  # noqa: ANN401 - any type hint
     """Read a type.
 
     Raises:
-      GraphError: the text is none, or names what is not there; the message begins with `where`.
+      GraphError: the text is not a type, or names something that does not exist; the message begins with `where`.
     """
     remedy = 'write it as in "int" or "list[my_robot.types.Pose]"'
     if not isinstance(text, str):
@@ -75,7 +75,7 @@ def type_of_text(text: str, where: str) -> Any:  # noqa: ANN401 - any type hint
         return _read(ast.parse(text, mode="eval").body)
     except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError) as error:  # the last: nested too deeply
         said = str(error) or "it is nested too deeply"
-        raise GraphError(f'{where}: "{text:.200}" is no type ({said:.200}); {remedy}') from error
+        raise GraphError(f'{where}: "{text:.200}" is not a type ({said:.200}); {remedy}') from error
 
 
 def _read(node: ast.expr) -> Any:  # noqa: ANN401
@@ -98,7 +98,7 @@ def _read(node: ast.expr) -> Any:  # noqa: ANN401
 
 
 def _found(name: str) -> Any:  # noqa: ANN401
-    """What has this name, of a module or of Python."""
+    """Return the object of this name, in a module or in Python."""
     if name == "Any":
         return Any
     *modules, last = name.split(".")

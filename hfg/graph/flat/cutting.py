@@ -34,7 +34,7 @@ class CutEdge(msgspec.Struct, frozen=True, eq=False):
       edge: as it is in the whole graph.
       source, target: the parts of its ends.
       guarantee: "exact" for whatever may lose nothing, "bounded" for signals with a policy that drops.
-      window: the most tokens that may be in progress, for what may lose nothing.
+      window: maximum number of tokens in progress, if none may be lost.
       hint: the declared type of what it carries.
       within_host: whether both ends are on one host.
       number: among those of the cutting, by their labels: it stays the same as long as they do.
@@ -131,7 +131,7 @@ class _Cutter:
         return home
 
     def _home_of_scope(self, scope: Scope) -> str | None:
-        """A subgraph is in a part if all of it is; else None, for it has no one place."""
+        """Return the part that contains all of a subgraph; None if it is divided."""
         homes = {self.home[member] for member in scope.members}
         if len(homes) == 1:
             return homes.pop()
@@ -143,7 +143,7 @@ class _Cutter:
         return None
 
     def _end_home(self, end: End, edge: FlatEdge) -> str | None:
-        """Return the part of one end; None if it has none, and that is told."""
+        """Return the part of one end; None, with a problem reported, if it has none."""
         if end.node >= 0:
             return self.home[end.node]
         if end.node == ROOT:

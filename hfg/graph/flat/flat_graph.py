@@ -1,6 +1,6 @@
 """What a graph is once its subgraphs are dissolved: plain data for runners and checks; `flat` makes it.
 
-Depends on `structure`, for the nodes, edges and levels it refers to.
+Depends on `structure`: it refers to nodes, edges and levels.
 """
 
 from __future__ import annotations
@@ -70,9 +70,9 @@ class End(msgspec.Struct, frozen=True, eq=False, gc=False):
     """One end of an edge.
 
     Attributes:
-      node: index of the node; `LINK` where the edge goes on in another part (see `cutting`); `ROOT` for the graph's own
-        ports, among which an input of the graph is an "output" and an output an "input";
-        `scope_end(k)` for the automatic ports of scope k.
+      node: index of the node; `LINK` where the edge continues in another part (see `cutting`); `ROOT` for the graph's
+        own ports, among which an input of the graph is an "output" and an output an "input"; `scope_end(k)` for the
+        automatic ports of scope k.
       port: the bound port; for an observable itself.
     """
 
@@ -139,7 +139,7 @@ class FlatGraph(msgspec.Struct, eq=False):
 
     @property
     def level(self) -> Level:
-        """What is behind the face of its graph."""
+        """The level of its graph."""
         return level_of(self.graph)
 
     def walk(self) -> Iterator[FlatGraph]:

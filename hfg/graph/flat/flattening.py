@@ -1,9 +1,9 @@
 """One graph without subgraphs, as plain data: what a runner makes its plan from and what the checks look at (rule G1).
 
 Subgraphs are dissolved: edges are followed through their ports from end to end, parameters to those they stand for.
-What iterates (rule G4) stays one node with a flat graph of its own. Everything is in depth-first order of adding, edges
-in that of connecting. Nothing recurses: graphs may be as deep as they like. Depends on `structure`; changes nothing
-there.
+An iterating subgraph (rule G4) stays one node with a flat graph of its own. Everything is in depth-first order of
+adding, edges in that of connecting. Nothing recurses: graphs may be as deep as they like. Depends on `structure`;
+changes nothing there.
 """
 
 from __future__ import annotations
@@ -86,8 +86,8 @@ class EdgeFollower:
         self.index_of = {node.node: node.index for node in flat.nodes}
         self.scope_of: Mapping[Any, Any] = {scope.subgraph: scope.index for scope in flat.scopes}
         self.depth_of: dict[Edge, int] = {}
-        # What goes on behind a port of a dissolved subgraph: inside behind inputs and slots, outside behind outputs and
-        # events.
+        # The edges that continue after a port of a dissolved subgraph: inside after inputs and slots, outside after
+        # outputs and events.
         self.behind: dict[Any, list[Edge]] = {}
 
     def collect(self) -> None:
@@ -131,7 +131,7 @@ class EdgeFollower:
             if inner is None:
                 return
             source, via = inner
-        # Behind a relay each way goes on; the relays that it came through tell a ring.
+        # After a relay each edge continues a path; a relay that occurs twice in one closes a ring.
         stack: list[tuple[tuple[Edge, ...], tuple[Any, ...]]] = [((edge,), ())]
         while stack:
             segments, relays = stack.pop()
@@ -229,7 +229,7 @@ class EdgeFollower:
             Problem(
                 path=lost._type.name if place is None else place.path,
                 severity="error",
-                what="a gate names a node that is not beside it",
+                what="a gate names a node of another level",
                 why="a gate does not reach into or out of a subgraph that iterates (rules A11, G4)",
                 remedy="gate nodes on the same side",
                 check="gate-border",
@@ -247,7 +247,7 @@ class EdgeFollower:
             Problem(
                 path=relay.path,
                 severity="error",
-                what=f"what comes over {edge.label} goes round through ports of subgraphs for ever",
+                what=f"what comes over {edge.label} goes round through ports of subgraphs forever",
                 why="no node lies on the way that would take it (rule G1)",
                 remedy="remove one of the edges between the subgraphs' ports, or put a node on the way",
                 check="relay-ring",

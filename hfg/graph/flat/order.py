@@ -12,7 +12,7 @@ __all__ = ["rings", "shortest_ring", "strongly_connected"]
 
 
 def strongly_connected(successors: Sequence[Sequence[int]]) -> list[list[int]]:
-    """Return the strongly connected parts, each sorted; a part comes behind those it leads to.
+    """Return the strongly connected parts, each sorted; a part comes after those it leads to.
 
     Tarjan's algorithm (1972) with the recursion turned into a stack of (node, next successor).
     """
@@ -59,7 +59,7 @@ def strongly_connected(successors: Sequence[Sequence[int]]) -> list[list[int]]:
 
 def rings(successors: Sequence[Sequence[int]]) -> list[list[int]]:
     """Return the parts in which something can go round, in order of their first node."""
-    if _is_acyclic(successors):  # as most graphs are, and this is told at a third of the cost
+    if _is_acyclic(successors):  # as most graphs are, and this test costs a third
         return []
     found = [part for part in strongly_connected(successors) if len(part) > 1 or part[0] in successors[part[0]]]
     return sorted(found)

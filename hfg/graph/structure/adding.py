@@ -47,7 +47,7 @@ def add(level: Level, node: Node, name: str | None, given: NodeGiven) -> None:
     options = PLAIN_NODE
     with Refusable(path):
         options = node_options(f'node "{path}"', said)
-        if options.iterate_over or not is_box(node):  # one that is dissolved is told more below
+        if options.iterate_over or not is_box(node):  # one that is dissolved gets a better message below
             need_fitting(node, path, options)
     level.members.append(name, node)
     settle(node, level, name, options)
@@ -95,7 +95,7 @@ def _need_new(node: object) -> None:
         else:
             remedy = "make a node type of a function with hfg.node, or derive a class from hfg.Node"
         raise GraphError(f"graph.add takes a node, got {node!r}; {remedy}")
-    if type(node).__init__ is not Node.__init__:  # what a decorator such as @dataclass does behind the declaration
+    if type(node).__init__ is not Node.__init__:  # a decorator such as @dataclass adds one after the declaration
         raise GraphError(
             f"node type {type(node).__name__} was given an __init__, by a decorator such as @dataclass: leave that out "
             "and declare hfg.Parameter and hfg.State"
@@ -124,7 +124,8 @@ def _with_iterated(node: Node, path: str, given: NodeGiven) -> NodeGiven:
     for name in names:
         if name not in node._type.inputs:
             raise GraphError(
-                f'subgraph "{path}": iterate_over names "{name}", which is no input; {suggest(name, node._type.inputs)}'
+                f'subgraph "{path}": iterate_over names "{name}", which is not an input; '
+                f"{suggest(name, node._type.inputs)}"
             )
     return {**given, "iterate_over": names} if names else given
 
@@ -142,7 +143,7 @@ def _need_subgraph_options(node: Node, options: NodeOptions) -> None:
 
 
 def need_fitting(node: Node, path: str, options: NodeOptions) -> None:
-    """Refuse firings beside each other, or once more, for a node whose code does not allow that.
+    """Refuse concurrency or retries for a node whose code does not allow them.
 
     Raises:
       GraphError: naming the option, with the remedy.
@@ -159,7 +160,7 @@ def _need_separate_firings(node: Node, said: str, options: NodeOptions) -> None:
     _need_firings_of_its_own(node, said)
     if kind.process_kind in ("generator", "async generator"):
         raise GraphError(
-            f"{said} lets several firings be under way at once, but the firings of a generator are its steps, one "
+            f"{said} lets several firings be in progress at once, but the firings of a generator are its steps, one "
             "after the other (rule F14); write an async function, or leave concurrency out"
         )
     if "ready" in kind.hooks:
@@ -169,8 +170,8 @@ def _need_separate_firings(node: Node, said: str, options: NodeOptions) -> None:
         )
     if options.release == "sequential":
         raise GraphError(
-            f'{said} does not go together with release="sequential", for its tokens count as processed as soon as they '
-            "are taken (rule F14); leave release out"
+            f'{said} does not go together with release="sequential", because its tokens count as processed as soon as '
+            "they are taken (rule F14); leave release out"
         )
 
 
@@ -186,7 +187,7 @@ def _need_repeatable(node: Node, said: str) -> None:
     if kind.states:
         raise GraphError(
             f"{said} would run a firing again with what the failed attempt has left in its state "
-            f'"{next(iter(kind.states))}" (rule X1); leave retries out, or keep the state in a node behind it'
+            f'"{next(iter(kind.states))}" (rule X1); leave retries out, or keep the state in a node after it'
         )
 
 

@@ -63,7 +63,7 @@ class Boundary:
         return port is self.start or port is self.stop or port is self.abort
 
     def add(self, port: GraphInput[Any] | GraphOutput[Any]) -> None:
-        """Add a port by which the graph is fed or read, behind the others."""
+        """Add a port by which the graph is fed or read, after the others."""
         if isinstance(port, GraphInput):
             self.inputs[port.name] = port
         else:

@@ -1,7 +1,7 @@
 """Connecting: every reason to refuse an edge at once (rules P1-P9, G1, G4), and declaring one that may be.
 
-What only shows once ports of subgraphs are followed from end to end (two edges into one input, a queue on what turns
-out to be synchronous) is found by the check. Depends on levels, edges, types and options.
+Problems that only show once ports of subgraphs are followed from end to end (two edges into one input, a queue on an
+edge that turns out to be synchronous) are found by the check. Depends on levels, edges, types and options.
 """
 
 from __future__ import annotations
@@ -218,7 +218,7 @@ def _need_settable(source: SourceEnd, target: TargetEnd) -> None:
     kind = target.node._type
     if kind.parameters[target.name].read_only:
         raise errors.ConnectionError(
-            f'"{end_path(source)}" cannot lead into the parameter "{target.path}", which is read-only: its node alone '
+            f'"{end_path(source)}" cannot lead into the parameter "{target.path}", which is read-only: only its node '
             "sets it; let an edge begin there, or declare it without read_only=True (rule P8)"
         )
     if kind.given_parameters_once:

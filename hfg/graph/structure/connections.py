@@ -17,8 +17,8 @@ class Connections:
 
     Attributes:
       edges: in order of connecting.
-      into: the edge into each target that takes one alone.
-      pairs: the ends of all other edges, and how many have them: amid an edit that will be refused, more than one.
+      into: the edge into each target that takes only one.
+      pairs: the ends of all other edges, and how many have them: more than one during an edit that will be refused.
     """
 
     __slots__ = ("_at", "_order", "edges", "into", "pairs")
@@ -52,7 +52,7 @@ class Connections:
         )
 
     def append(self, edge: Edge) -> None:
-        """Add an edge behind all others."""
+        """Add an edge after all others."""
         self.edges.append(edge)
         self._note(edge)
         if self._order is not None:

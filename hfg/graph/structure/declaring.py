@@ -36,10 +36,10 @@ __all__ = [
 
 
 def need_new_port(level: Level, kind: Literal["input", "output"], name: str, hint: object) -> None:
-    """Refuse a port that cannot be, and what is no change by hand.
+    """Refuse a port that cannot be, and any change of a running graph.
 
     Raises:
-      GraphError: the name is taken or not allowed, the type is none, or this is the inside of a subgraph.
+      GraphError: the name is taken or not allowed, the type is not a type, or this is the inside of a subgraph.
     """
     level.need_rest("declaring a port")
     if level.owner is not None:
@@ -52,7 +52,7 @@ def need_new_port(level: Level, kind: Literal["input", "output"], name: str, hin
         raise GraphError(f'{level.title} has a port "{name}" already; choose another name')
     if not is_hint(hint):
         raise GraphError(
-            f'the type of {kind} "{name}" is {hint!r:.80}, which is no type; write graph.{kind}("{name}", int)'
+            f'the type of {kind} "{name}" is {hint!r:.80}, which is not a type; write graph.{kind}("{name}", int)'
         )
 
 
@@ -113,7 +113,7 @@ def refuse_gate(level: Level, gate: Gate) -> None:
     """Raise if the gate cannot be; changes nothing.
 
     Raises:
-      GraphError: what is given is no node of this graph, or is gated already; or the rate is none.
+      GraphError: one of the two is not a node of this graph, the target already has a gate, or the rate is invalid.
     """
     for node in (gate.target, gate.by):
         if not isinstance(node, Node):
@@ -159,11 +159,11 @@ def refuse_promotion(level: Level, outer: ParameterPort[Any], inner: ParameterPo
             )
     if level.owner is None or outer.node is not level.owner:
         raise GraphError(
-            f'"{outer.path}" is no parameter of the subgraph whose inside this is ({level.title}); '
+            f'"{outer.path}" is not a parameter of the subgraph whose inside this is ({level.title}); '
             "call graph.promote in build() with a parameter of self"
         )
     if inner.graph is not level.face:
-        raise GraphError(f'"{inner.path}" cannot be promoted, for its node is not in {level.title}; add it there first')
+        raise GraphError(f'cannot promote "{inner.path}": its node is not in {level.title}; add the node there first')
     if level.promotions.has(inner):
         raise GraphError(
             f'"{inner.path}" is promoted already; '
@@ -186,7 +186,7 @@ def refuse_standing(outer: ParameterPort[Any], inner: ParameterPort[Any]) -> Non
     """
     if inner.spec.read_only:
         raise GraphError(
-            f'"{outer.path}" cannot stand for "{inner.path}", which its node alone sets; connect that to an output of '
+            f'"{outer.path}" cannot stand for "{inner.path}", which only its node sets; connect it to an output of '
             "the subgraph"
         )
     reason = why_not(outer.type, inner.type)

@@ -89,15 +89,15 @@ def is_feed(end: object) -> bool:
 
 
 def owner_of(end: SourceEnd) -> object:
-    """Return the node, or whole graph, that an end belongs to as seen from outside; an inner side belongs to nobody."""
+    """Return the node, or whole graph, that an end belongs to as seen from outside; None for an inner side."""
     return end.node if isinstance(end, Port) else None
 
 
 def is_single(target: TargetEnd) -> bool:
     """Return whether at most one edge may lead into it (rule P2): inputs and parameters.
 
-    A subgraph's output seen from inside is a relay, at which streams may converge before a slot (rule G1);
-    that no input gets two edges so is seen by the check. What iterates makes one list of each output (rule G4).
+    A subgraph's output seen from inside is a relay, at which streams may converge before a slot (rule G1); the check
+    finds an input that gets two edges in this way. An iterating subgraph makes one list of each output (rule G4).
     """
     return target.kind in ("input", "parameter") or (target.kind == "output" and bool(iterated(target.node)))
 

@@ -37,7 +37,7 @@ class Gates:
         return iter(self.listed)
 
     def append(self, gate: Gate) -> None:
-        """Set a gate behind all others."""
+        """Set a gate after all others."""
         self.insert(len(self.listed), gate)
 
     def insert(self, position: int, gate: Gate) -> None:

@@ -25,7 +25,7 @@ __all__ = ["edge_options", "group_spec", "node_options"]
 
 
 def edge_options(where: Callable[[], str], given: Mapping[str, Any]) -> EdgeOptions:
-    """Check what is said of an edge and return the object shared by all that have the same.
+    """Check the options of an edge and return the object shared by all edges that have the same.
 
     Raises:
       ConnectionError: a value is out of its range, or the options contradict each other; the message begins with what
@@ -86,7 +86,7 @@ def _need_growing(at: str, options: EdgeOptions) -> None:
 
 
 def _listed(at: str, name: str, given: object, example: str) -> tuple[Any, ...]:
-    """Several things, in order; one alone is the likely slip."""
+    """Return several things, in order; a single one is the likely slip."""
     if not isinstance(given, Iterable) or isinstance(given, str):
         raise errors.ConnectionError(f"{at}: {name} takes a list, as in {name}={example}, got {given!r}")
     return tuple(given)
@@ -96,7 +96,7 @@ def _listed(at: str, name: str, given: object, example: str) -> tuple[Any, ...]:
 
 
 def node_options(where: str, given: Mapping[str, Any]) -> NodeOptions:
-    """Check what is said of a node and return the object shared by all that have the same, which are checked once.
+    """Check the options of a node and return the object shared by all nodes that have the same, checked once.
 
     Raises:
       GraphError: a value is out of its range; the message begins with `where`.
@@ -108,7 +108,7 @@ def node_options(where: str, given: Mapping[str, Any]) -> NodeOptions:
     said = dict(given)
     if "retry_on" in said:
         said["retry_on"] = error_names(where, said["retry_on"], retries=said.get("retries", 0))
-    with contextlib.suppress(GraphError, TypeError):  # the second: one that cannot be hashed, and so is none
+    with contextlib.suppress(GraphError, TypeError):  # TypeError: one that cannot be hashed, so it is invalid
         return _right_options(**said)
     return _checked(where, said)  # which refuses them in the name of the node
 
@@ -127,7 +127,7 @@ def _checked(where: str, said: dict[str, Any]) -> NodeOptions:
 
 
 def group_spec(name: str, given: Mapping[str, Any]) -> GroupSpec:
-    """Check what is said of a group.
+    """Check the options of a group.
 
     Raises:
       GraphError: a value is out of its range.

@@ -27,7 +27,7 @@ class Groups:
         self._declared: set[str] = set()
 
     def declare(self, spec: GroupSpec) -> None:
-        """Add a group; the same may be said again, as subgraphs of one type do.
+        """Add a group; declaring the same again is allowed, as subgraphs of one type do.
 
         Raises:
           GraphError: it is declared otherwise already.

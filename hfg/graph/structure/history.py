@@ -1,6 +1,6 @@
-"""What was done to a graph and can be taken back, and what was taken back and can be done again.
+"""The edits of a graph that can be undone, and those that can be redone.
 
-Two stacks: what lies on them is the matter of who edits. Knows no graph.
+Two stacks of objects that only the code that edits interprets. Does not depend on graphs.
 """
 
 from __future__ import annotations

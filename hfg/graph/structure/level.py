@@ -40,7 +40,7 @@ def inside(node: object) -> Level | None:
 
 
 def level_of(graph: HasLevel) -> Level:
-    """Return what is behind the face of a graph."""
+    """Return the level of a graph."""
     return graph._level
 
 
@@ -54,7 +54,7 @@ class Level:
       face: the graph that users hold; nodes and ports say it when they are asked where they are.
       nodes: by name, in order of adding; written by `members`.
       edges: in order of connecting; written by `connections`.
-      members: the table behind `nodes`; `connections`, `gates` and `promotions` are the others.
+      members: the table of `nodes`; `connections`, `gates` and `promotions` are the others.
       ports: those of the whole graph, as far as they are seen here.
     """
 
@@ -73,7 +73,7 @@ class Level:
     )
 
     def __init__(self, name: str, whole: Whole, *, face: HasLevel | None = None, owner: Box | None = None) -> None:
-        """Begin empty: at the root behind a face that there is already, inside a subgraph with a new one."""
+        """Start empty. The root has a face already; the inside of a subgraph gets a new one."""
         self.name = name
         self.whole = whole
         self.owner = owner
@@ -186,7 +186,7 @@ class Whole:
       run: the run it has, if any; a graph has one at a time.
       takes_commands: commands are being carried out, which a run follows and the history knows.
       notes: of editors, by node; None: those about the whole. Nothing else reads them, and they go with their node.
-      history: of edits; what lies on it is the matter of who edits.
+      history: of edits; only the code that edits interprets its objects.
     """
 
     __slots__ = ("box_type", "gated", "groups", "history", "make_face", "notes", "root", "run", "takes_commands")
@@ -204,7 +204,7 @@ class Whole:
         self.history: History[Any] = History(lambda: self.root.title)
 
     def begin_run(self, run: object) -> None:
-        """From now on the structure is changed by commands alone."""
+        """From now on only commands change the structure."""
         self.run = run
 
     def end_run(self) -> None:

@@ -1,4 +1,4 @@
-"""The nodes of one level by name, in order. Knows nothing of who may be one."""
+"""The nodes of one level by name, in order. Does not check which nodes may be there."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Members:
         """Return the type's name, or with _2, _3 in order of adding; and the number to `count` once the node is in."""
         number = self._counts.get(base, 0) + 1
         name = base if number == 1 else f"{base}_{number}"
-        while name in self.nodes:  # somebody gave this name by hand
+        while name in self.nodes:  # the user gave this name to another node
             number += 1
             name = f"{base}_{number}"
         return name, number
@@ -56,7 +56,7 @@ class Members:
         return self.order.position(self.nodes[name])
 
     def append(self, name: str, node: Node) -> None:
-        """Add a node behind all others."""
+        """Add a node after all others."""
         self._note(len(self.nodes), node)
         self.nodes[name] = node
 

@@ -16,7 +16,7 @@ def need_name(what: str, name: object) -> str:
     """Refuse what cannot be part of a path; `what` begins the message.
 
     Raises:
-      GraphError: it is no text, empty, has characters that steer a terminal, or one of the two that paths are made of.
+      GraphError: it is not a string, is empty, or contains control characters or one of the two separators of paths.
     """
     if not isinstance(name, str) or not name:
         raise GraphError(f"{what} needs a name that is a text and not empty, got {name!r}")

@@ -1,7 +1,7 @@
 """Operators on edges that can be found by name (rule P9), so that commands, and later files, can say them.
 
-Any reactivex operator may stand on an edge; one made by a function that `operator` knows carries the name of that
-function and what it was given. Depends on errors.
+An edge may have any reactivex operator; one made by a function that `operator` knows carries the name of that
+function and its arguments. Depends on errors.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class OperatorFunction(Generic[P]):
         made = self._function(*arguments, **parameters)
         if not callable(made):
             raise DeclarationError(
-                f"operator {self.name} gave {made!r}, which is no reactivex operator; "
+                f"operator {self.name} gave {made!r}, which is not a reactivex operator; "
                 "let it return one, as in `return ops.debounce(seconds)`"
             )
         return NamedOperator(self, arguments, parameters, made)
@@ -116,7 +116,7 @@ def operator(function: Callable[P, Operator]) -> OperatorFunction[P]:
     `hfg.operator(ops.debounce)(0.2)`.
 
     Raises:
-      DeclarationError: it is no function.
+      DeclarationError: it is not a function.
 
     Examples:
       >>> from reactivex import operators as ops
@@ -136,7 +136,9 @@ def find_operator(
     """
     module, colon, name = reference.partition(":")
     if not (module and colon and name):
-        raise GraphError(f'{where}: "{reference}" is no reference to an operator; write "my_robot.operators:smoothed"')
+        raise GraphError(
+            f'{where}: "{reference}" is not a reference to an operator; write "my_robot.operators:smoothed"'
+        )
     try:
         importlib.import_module(module)
     except Exception as error:  # code of users raises what it likes
@@ -144,7 +146,7 @@ def find_operator(
             f'{where}: operator "{reference}": importing "{module}" failed ({type(error).__name__}: {error})'
         ) from error
     found = look_up(module, name)
-    if module == _OPERATORS:  # it has many imported names beside its own functions
+    if module == _OPERATORS:  # it has many imported names in addition to its own functions
         found = OperatorFunction(found) if name in operators.__all__ else None
     if not isinstance(found, OperatorFunction):
         what = f'module "{module}" has no "{name}"' if found is None else f"it is {found!r:.60}, no operator"

@@ -47,7 +47,7 @@ class Option:
     """What is declared about an option besides its name, type and default.
 
     Attributes:
-      says: what it means, as a sentence.
+      says: its meaning, a whole sentence.
       least, most, above: limits of a number.
       expects: what a value must be in words, where type and limits do not tell enough.
       fits: what else a value must be.
@@ -99,7 +99,7 @@ class Declared:
 
     @property
     def expects(self) -> str:
-        """What a value must be, in words."""
+        """The values that are allowed, in words."""
         option = self.option
         if option.expects:
             return option.expects

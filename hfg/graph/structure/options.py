@@ -1,9 +1,9 @@
 """The options of edges, nodes and groups. This is the place to add one; for a run, see `engine.runtime.settings`.
 
 Each is declared once, as a field with an `Option`: its type, default, limits, unit, meaning, who may have it and how a
-drawing shows it. What may be given in a call stands above it for type checkers, by name and type. Everything else is
-made of the declarations: commands, graph files and their schema, saving and loading, editing, grouping and cutting,
-labels in drawings, and the tables in docs/reference.md.
+drawing shows it. The arguments of a call are declared above it for type checkers, by name and type. Everything else is
+derived from the declarations: commands, graph files and their schema, saving and loading, editing, grouping and
+cutting, labels in drawings, and the tables in docs/reference.md.
 
 Depends on `option`, not on nodes or ports.
 """
@@ -141,7 +141,7 @@ class EdgeFields(Fields[EdgeGiven[Any, Any]], kw_only=True):
         """Return the options whose values differ from their defaults, by name."""
         found = super().said()
         if self.overflow == "latest":
-            found.pop("capacity", None)  # it is 1 by that
+            found.pop("capacity", None)  # which is then 1
         return found
 
 

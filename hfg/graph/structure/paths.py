@@ -29,7 +29,7 @@ __all__ = [
 
 
 def find(level: Level, path: str) -> Any:  # noqa: ANN401 - of a path type checkers know nothing
-    """Follow a path to a node or, behind a dot, to a port.
+    """Follow a path to a node or, after a dot, to a port.
 
     Raises:
       GraphError: some part of it does not exist; the message names the first such part and what was probably meant.
@@ -42,7 +42,7 @@ def find(level: Level, path: str) -> Any:  # noqa: ANN401 - of a path type check
         box = _node(around, name, path)
         within = inside(box)
         if within is None:
-            raise GraphError(f'there is no "{path}": "{box.place.path}" is no subgraph, so nothing is inside it')
+            raise GraphError(f'there is no "{path}": "{box.place.path}" is not a subgraph, so nothing is inside it')
         around = within
     name, dot, port = last.partition(".")
     if not dot:
@@ -63,13 +63,13 @@ def split_inner(name: str, path: str) -> tuple[str, bool]:
     """Take ".inner" off the name of a port, and say whether it was there.
 
     Raises:
-      GraphError: something else stands behind the port.
+      GraphError: something else follows the port.
     """
     port, dot, side = name.partition(".")
-    if side == "sent":  # the event beside an output is a port of its own
+    if side == "sent":  # the event of an output is a port of its own
         return name, False
     if side != ("inner" if dot else ""):
-        raise GraphError(f'there is no "{path}": behind a port only ".inner" may follow, behind an output ".sent"')
+        raise GraphError(f'there is no "{path}": only ".inner" may follow a port, and ".sent" an output')
     return port, bool(dot)
 
 
@@ -77,7 +77,7 @@ def inner_side(node: Node, found: Sequence[Port], path: str) -> InnerSource[Any]
     """Return the side of a subgraph's port that looks into it; of several the first.
 
     Raises:
-      GraphError: the node is no subgraph, or has no such port.
+      GraphError: the node is not a subgraph, or has no such port.
     """
     relays = [one for one in found if is_box(node) and one.kind != "parameter"]
     if relays:
@@ -161,7 +161,7 @@ def level_and_name(level: Level, path: str) -> tuple[Level, str]:
         return level, name
     inner = inside(node_at(level, around))
     if inner is None:
-        raise GraphError(f'"{path}" cannot be: "{around}" is no subgraph, so nothing is inside it')
+        raise GraphError(f'"{path}" cannot be: "{around}" is not a subgraph, so nothing is inside it')
     return inner, name
 
 
@@ -170,7 +170,7 @@ def meant(level: Level, what: Any, at: Callable[[Level, str], Any]) -> Any:  # n
 
     Args:
       level: from where the path leads.
-      what: a path, or anything else, which is given back as it is.
+      what: a path, or anything else, which is returned as it is.
       at: what finds it, `node_at` or another of these.
 
     Raises:

@@ -11,7 +11,7 @@ __all__ = ["Promotions"]
 
 
 class Promotions:
-    """What the parameters of one subgraph stand for.
+    """The inner parameters that the parameters of one subgraph stand for.
 
     Attributes:
       by_name: of the subgraph's parameter, the parameters inside, in order of promoting.

@@ -1,7 +1,7 @@
 """Refusals that are kept instead of raised, so that the check of a graph that cannot be built tells all at once.
 
-Normally what a graph refuses is raised where it is said. Inside `keep_refusals` it is written down, and building goes
-on as well as it can. Depends on naming.
+Normally a graph raises an error in the call that is refused. Inside `keep_refusals` errors are collected, and building
+continues as well as it can. Depends on naming.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def _where() -> str:
 
 
 def _name_of(end: object) -> str:
-    """What a refused port, node or name is called, whatever it is."""
+    """Return the name of a refused port, node or name, whatever it is."""
     if isinstance(end, str):
         return end
     path = path_of(end) if isinstance(end, Node) else getattr(end, "path", None)

@@ -54,8 +54,8 @@ def _error_name(where: str, error: object) -> str:
         found = error
     if not isinstance(found, type) or not issubclass(found, Exception):
         raise GraphError(
-            f"{where}: retry_on takes classes of errors, as in retry_on=(ConnectionError,), got {error!r}, which is "
-            "none" + (": what ends a task or the program on purpose is not tried again" if _is_exit(found) else "")
+            f"{where}: retry_on takes classes of errors, as in retry_on=(ConnectionError,), got {error!r}"
+            + (", which ends a task or the program on purpose and is not tried again" if _is_exit(found) else "")
         )
     return found.__qualname__ if found.__module__ == "builtins" else f"{found.__module__}:{found.__qualname__}"
 

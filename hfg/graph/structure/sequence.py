@@ -1,7 +1,7 @@
 """A sequence in which places are found without counting: order maintenance by labels.
 
 Each item has a number that grows along the sequence; one that comes between two others gets a number between theirs, so
-that nobody else is renumbered. Only when two numbers have nothing between them any more, all are numbered again; that
+that no other item is renumbered. Only when two numbers have nothing between them any more, all are numbered again; that
 takes some fifty insertions at one spot, so that its cost is shared by them. Depends on nothing.
 """
 

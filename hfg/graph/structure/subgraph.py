@@ -1,6 +1,6 @@
 """Boxes: nodes that hold a graph; their ports are relays between outside and inside (rules G1-G4).
 
-Users know them as `hfg.Subgraph`, which knows `hfg.Graph` and therefore is defined beside it. Depends on node types.
+Users know them as `hfg.Subgraph`, which is defined next to `hfg.Graph` because it depends on it. Depends on node types.
 """
 
 from __future__ import annotations

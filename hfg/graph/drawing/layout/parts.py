@@ -133,7 +133,7 @@ class Link(msgspec.Struct, eq=False):
 
 
 class Work(msgspec.Struct, eq=False):
-    """A level while it is laid out."""
+    """A level during its layout."""
 
     things: list[Thing]
     links: list[Link]

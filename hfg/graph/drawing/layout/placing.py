@@ -147,7 +147,7 @@ def _depths(near: Sequence[Thing], ways: Sequence[Link], side: dict[int, int]) -
     for sign in (-1, 1):
         own = {one.number: one for one in near if side[one.number] == sign}
         inner = [link for link in ways if link.tail is not None and link.tail.number in own]
-        # What it gets through a slot comes from above, so it may stand below who sends it.
+        # Signals into a slot come from above, so the node may be placed below their sender.
         inner = [
             link
             for link in inner

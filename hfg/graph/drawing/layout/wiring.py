@@ -40,7 +40,7 @@ class Levels:
         self.all = [Level(None, None)]
         self.by_id: dict[str, Shape] = {}
         self.home: dict[str, Level] = {}  # of nodes and boxes
-        self.inside: dict[str, Level] = {}  # of ports of open subgraphs: what is behind them
+        self.inside: dict[str, Level] = {}  # of ports of open subgraphs: the level inside
         stack = [self.all[0]]
         for depth, shape in picture.items:
             del stack[depth + 1 :]
