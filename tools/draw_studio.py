@@ -37,7 +37,7 @@ def _look_away(page: Page) -> None:
 
 def _arena(page: Page) -> None:
     """The views of the arena and of the cameras next to the mission."""
-    page.locator("#stage .caption", has_text="visit").wait_for()
+    page.locator("#stage .caption", has_text="position").wait_for()
     page.locator(".live", has_text=re.compile("^live$")).wait_for()
     _look_away(page)
 
