@@ -21,13 +21,13 @@ from hfg.cli.settings import set_parameters
 from hfg.cli.sockets import find, which
 from hfg.cli.target import load_graph
 from hfg.engine import PunctualLoop
-from hfg.errors import TargetError
+from hfg.errors import TargetError, UsageError
 from hfg.files.opening import SUFFIX
 from hfg.graph import Graph
 from hfg.graph.structure.level import inside as structure_of
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.paths import node_at
-from hfg.studio.project import Project
+from hfg.studio.project import Project, RecordedProject
 from hfg.studio.studio import Studio
 
 __all__ = ["studio"]
@@ -36,7 +36,7 @@ __all__ = ["studio"]
 def studio(
     target: Annotated[
         str | None,
-        typer.Argument(help="module:graph, file.py, file.py:graph or file.hfg.yaml; default: an empty graph"),
+        typer.Argument(help="module:graph, file.py, file.hfg.yaml or a recording, run.mcap; default: an empty graph"),
     ] = None,
     host: Annotated[str, typer.Option(help="Address to listen at; other than this machine needs TLS.")] = "127.0.0.1",
     port: Annotated[int | None, typer.Option(help="Port; default: the first free one from 8800.")] = None,
@@ -44,7 +44,10 @@ def studio(
         str | None, typer.Option(metavar="RUN", help="Follow and steer a run of hfg run: its process id or graph.")
     ] = None,
     inside: Annotated[str, typer.Option(metavar="SUBGRAPH", help="Show the inside of a subgraph first.")] = "",
-    run: Annotated[bool, typer.Option("--run", help="Start the graph at once.")] = False,
+    into: Annotated[
+        str | None, typer.Option("--into", metavar="TARGET", help="The graph of a recording that does not describe it.")
+    ] = None,
+    run: Annotated[bool, typer.Option("--run", help="Start the graph, or play the recording, at once.")] = False,
     read_only: Annotated[bool, typer.Option("--read-only", help="Pages may look, not change.")] = False,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
     certfile: Annotated[Path | None, typer.Option(help="Certificate for TLS (PEM).")] = None,
@@ -71,9 +74,9 @@ def studio(
     if attach is not None:
         return _attach(attach, target, options, browser, read_only=read_only)
     if target is not None and target.endswith(".mcap"):
-        raise TargetError(
-            f"recordings cannot be opened in the studio yet: hfg play {target} plays one, hfg info shows it"
-        )
+        return _look_at(target, into, arg, allow, options, browser, at_once=run)
+    if into is not None:
+        raise TargetError(f'--into names the graph of a recording, so "{into}" means nothing here; leave it out')
     graph = Graph("graph") if target is None else load_graph(target, arg or [], allow)
     set_parameters(graph, param or [])
     file = _file_of(target)
@@ -88,6 +91,28 @@ def studio(
 def _need_subgraph(graph: Graph, path: str) -> None:
     if path and structure_of(node_at(level_of(graph), path)) is None:
         raise TargetError(f'"{path}" is not a subgraph, so nothing is inside it; name another one by --inside')
+
+
+def _look_at(
+    file: str,
+    into: str | None,
+    arg: list[str] | None,
+    allow: list[str] | None,
+    options: Mapping[str, Any],
+    browser: bool,
+    *,
+    at_once: bool,
+) -> int:
+    """Serve pages of a recording."""
+    from hfg.studio.recorded import Recorded
+
+    graph = None if into is None else load_graph(into, arg or [], None if allow is None else allow)
+    try:
+        recorded = Recorded(file, graph, allow=allow or ())
+    except UsageError as error:
+        raise TargetError(str(error)) from None
+    graph = recorded.graph_after(0)
+    return _serve(Studio(RecordedProject(graph, Path(file)), recorded=recorded), options, browser, at_once=at_once)
 
 
 def _serve(made: Studio, options: Mapping[str, Any], browser: bool, *, at_once: bool) -> int:

@@ -5,6 +5,8 @@ choosing    the nodes that play it
 stand_ins   the types that take their places
 players     play step by step, each at its time
 tracks      the steps of one node: firings, calls, signals
+course      activity, parameters, edits and errors by time
+seeking     messages by time, chunk by chunk              `hfg studio run.mcap`
 reading     files, including damaged ones                 `hfg info`
 recovering  makes a complete file of an incomplete one    `hfg recover`
 recording   which ports, description of the run           `run.record`, `hfg record`

@@ -125,7 +125,7 @@ class Layout:
         self.statistics: Statistics | None = None
         # checksum of everything before a position, as stated by its writer
         self._checksum: tuple[int, int] | None = None
-        self._indexed: dict[int, int] = {}  # length of each chunk in the summary, by its position
+        self._indexed: dict[int, ChunkIndex] = {}  # the chunks in the summary, by their positions
         self._bare = False  # the last piece consists of messages outside chunks
         end = self._read_summary()
         self._places = sorted(self._indexed)
@@ -181,7 +181,7 @@ class Layout:
         at, length = record.chunk_start_offset, record.chunk_length
         if at < len(MAGIC) or length < HEAD.size or at + length > self._size:
             raise Damaged("it lists a chunk that is not in the file")
-        self._indexed[at] = length
+        self._indexed[at] = record
 
     # --- the data -----------------------------------------------------------------------------------------------------
 
@@ -190,8 +190,8 @@ class Layout:
         while at < end and not self.ended:
             known = self._indexed.get(at)
             if known is not None:
-                self._add(Piece(at + HEAD.size, known - HEAD.size, is_chunk=True))
-                at += known
+                self._add(Piece(at + HEAD.size, known.chunk_length - HEAD.size, is_chunk=True))
+                at += known.chunk_length
                 continue
             try:
                 opcode, length = self._head(at, self._next_indexed(at, end))
@@ -283,16 +283,42 @@ class Layout:
     def lost_in(self, piece: Piece) -> tuple[int | None, int | None, int | None]:
         """Return the contents of an unreadable chunk as far as known: number of messages, and their times."""
         count = None
-        for length in self._message_indexes(piece.end):
+        for _, length in self._message_indexes(piece.end):
             count = (count or 0) + max(length - 6, 0) // 16
+        first, last = self.times_of(piece)
+        return count, first, last
+
+    def times_of(self, piece: Piece) -> tuple[int | None, int | None]:
+        """Return the times of the first and the last message of a chunk according to its head, if it can be read."""
         try:
             head = chunk_head(self._at(piece.begin, min(piece.length, _HEAD_OF_A_CHUNK)), piece.length)
         except Damaged:
-            return count, None, None
-        return count, head.first, head.last
+            return None, None
+        return head.first, head.last
 
-    def _message_indexes(self, at: int) -> Iterator[int]:
-        """Yield the lengths of the index records after a chunk."""
+    def indexes_of(self, piece: Piece) -> dict[int, tuple[int, int]]:
+        """Return position and length of the index of each channel after a chunk; none if it has no indexes.
+
+        These are the contents of records, which consist of the channel, a length, and pairs of a time and a place.
+        """
+        known = self._indexed.get(piece.begin - HEAD.size)
+        if known is None or not known.message_index_offsets:
+            found = {}
+            for at, length in self._message_indexes(piece.end):
+                found[int.from_bytes(self._at(at, 2), "little")] = at, length
+            return found
+        places = sorted(known.message_index_offsets.items(), key=lambda item: item[1])
+        ends = [*(at for _, at in places[1:]), places[0][1] + known.message_index_length]
+        if piece.end != places[0][1] or ends[-1] > self._size:
+            return {}  # the summary contradicts itself
+        return {
+            channel: (at + HEAD.size, end - at - HEAD.size)
+            for (channel, at), end in zip(places, ends, strict=True)
+            if end - at >= HEAD.size
+        }
+
+    def _message_indexes(self, at: int) -> Iterator[tuple[int, int]]:
+        """Yield positions and lengths of the index records after a chunk."""
         while True:
             try:
                 opcode, length = self._head(at, self._size)
@@ -300,8 +326,12 @@ class Layout:
                 return
             if opcode != Opcode.MESSAGE_INDEX:
                 return
-            yield length
+            yield at + HEAD.size, length
             at += HEAD.size + length
+
+    def read(self, at: int, length: int) -> bytes:
+        """Read some bytes of the file."""
+        return self._at(at, length)
 
     def keeps_its_checksum(self) -> bool:
         """Return whether everything before the end of the data is unchanged, as far as the file has a checksum."""

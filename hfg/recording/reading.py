@@ -318,13 +318,13 @@ class File:
         if kept is not None:
             self._kept.move_to_end(number)
             return kept
-        piece = self.layout.pieces[number]
+        data = self.unpacked(number)
+        if data is None:
+            return None
         try:
-            record = self.layout.content(piece.begin, piece.length)
-            content = content_of(unpacked(record) if piece.is_chunk else record, self._declare)
+            content = content_of(data, self._declare)
         except Damaged as error:
-            self._lost[number] = loss = self._loss(number, str(error))
-            self.when_lost(loss)
+            self.lose(number, str(error))
             return None
         self._kept[number] = content
         while len(self._kept) > _KEPT_CHUNKS or (
@@ -332,6 +332,25 @@ class File:
         ):
             self._kept.popitem(last=False)
         return content
+
+    def unpacked(self, number: int) -> bytes | None:
+        """Return the records of a piece as bytes. Return None if it cannot be read, and record the loss."""
+        if number in self._lost:
+            return None
+        piece = self.layout.pieces[number]
+        try:
+            record = self.layout.content(piece.begin, piece.length)
+            return unpacked(record) if piece.is_chunk else record
+        except Damaged as error:
+            self.lose(number, str(error))
+            return None
+
+    def lose(self, number: int, why: str = "") -> Loss:
+        """Record that a piece cannot be read, unless that is known already; return what is lost."""
+        if number not in self._lost:
+            self._lost[number] = self._loss(number, why)
+            self.when_lost(self._lost[number])
+        return self._lost[number]
 
     def _loss(self, number: int, why: str) -> Loss:
         piece = self.layout.pieces[number]

@@ -85,6 +85,7 @@ class Following:
         self._is_stale = False
         self._dirty.clear()
         tables = describe_graph(self.graph)
+        tables["nodes"] = self.steering.shown(tables["nodes"])
         tables["studio"] = self._singles()
         tables["breakpoints"] = self.steering.breakpoints()
         self.tell(self.tables.replace(tables, by, text))
@@ -108,6 +109,7 @@ class Following:
         for path in paths:
             if path in before:
                 nodes[path] = changed_record(self.graph, before[path])
+        nodes = self.steering.shown(nodes)
         self.tell(self.tables.replace({"nodes": nodes, "studio": self._singles()}, by, text))
         self.layouts_wanted()
 
@@ -168,6 +170,21 @@ class Following:
         if isinstance(event, ActivityChanged):  # after those who want to know who was active before
             self.spans.change(event.node, self.steering.since_begin(event.time), active=event.active)
 
+    def settings_changed(self, paths: Iterable[str]) -> None:
+        """See `Follower`."""
+        self._refresh_nodes(paths)
+
+    def graph_changed(self, graph: Graph, text: str) -> None:
+        """See `Follower`."""
+        self.project.graph = self.steering.graph = graph
+        self.refresh_all(0, text)
+
+    def cursor_moved(self) -> None:
+        """See `Follower`."""
+        now = asyncio.get_running_loop().time()
+        for viewer in list(self.viewers.values()):
+            viewer.hurry(now)
+
     def _last_edit(self) -> str:
         record = self.attribution.record(self.graph)
         return record.done[-1].text if record.done else ""
@@ -206,7 +223,7 @@ class Following:
 
     def check_soon(self) -> None:
         """Look for mistakes after a short pause without edits."""
-        if self.viewers:
+        if self.viewers and self.steering.is_live:
             if self._check is not None:
                 self._check.cancel()
             self._check = asyncio.get_running_loop().call_later(_CHECK_S, self._check_now)

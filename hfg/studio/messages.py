@@ -46,6 +46,7 @@ __all__ = [
     "Reread",
     "Reset",
     "Save",
+    "Seek",
     "Snapshot",
     "Start",
     "Step",
@@ -132,9 +133,16 @@ class Reset(Request, frozen=True, tag="reset"):
 
 
 class Step(Request, frozen=True, tag="step"):
-    """One step of a node, or of all."""
+    """One step of a node, or of all; only in a recording also back."""
 
     path: Text = ""
+    back: bool = False
+
+
+class Seek(Request, frozen=True, tag="seek"):
+    """Show a recording as the run was at a time, in seconds after its begin."""
+
+    at: float
 
 
 class Trigger(Request, frozen=True, tag="trigger"):
@@ -265,6 +273,7 @@ FromPage: TypeAlias = (
     | Proceed
     | Reset
     | Step
+    | Seek
     | Trigger
     | Act
     | Break

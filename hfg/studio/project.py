@@ -12,6 +12,9 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import msgspec
+from typing_extensions import override
+
 from hfg.base.bounds import GRAPH_FILE_BYTES
 from hfg.base.whole import read_plain
 from hfg.files import describe, load, save, text_of
@@ -22,7 +25,7 @@ from hfg.studio.journal import Journal
 from hfg.studio.records import FileRecord, JournalOffer
 from hfg.studio.refusing import Refused
 
-__all__ = ["Project"]
+__all__ = ["Project", "RecordedProject"]
 
 _MOST_FILES: Final = 1000
 _MOST_LINES: Final = 5000
@@ -257,6 +260,20 @@ class Project:
             theirs = read_plain(self.file, _MOST_BYTES).decode(errors="replace").splitlines()
         name = "new" if self.file is None else self.file.name
         return list(difflib.unified_diff(theirs, mine, f"{name} (disk)", f"{name} (yours)", lineterm=""))[:_MOST_LINES]
+
+
+class RecordedProject(Project):
+    """The project of a recording, which has nothing to save."""
+
+    def __init__(self, graph: Graph, file: Path) -> None:
+        super().__init__(graph, file.resolve().parent, keep=False)
+        self._recording = file.name
+
+    @override
+    def record(self) -> FileRecord:
+        return msgspec.structs.replace(
+            super().record(), name=self._recording, path=self._recording, kind="recording", changes=0
+        )
 
 
 def _kind(file: Path) -> str:

@@ -221,6 +221,7 @@ class RunRecord(msgspec.Struct, frozen=True):
       error: what it failed with: message, path, what, remedy, traceback.
       number: which run of this studio it is, from 1.
       steerable: it can be started and ended from here.
+      length_s: of a recording, whose state is "paused" or "running" while it is played; None: it is not a recording.
     """
 
     state: str = "rest"
@@ -232,6 +233,7 @@ class RunRecord(msgspec.Struct, frozen=True):
     number: int = 0
     steerable: bool = True
     clock: str = "real"
+    length_s: float | None = None
 
 
 class StepRecord(msgspec.Struct, frozen=True):
@@ -263,7 +265,7 @@ class FileRecord(msgspec.Struct, frozen=True):
 
     Attributes:
       path: relative to the folder; "" if there is none yet.
-      kind: "yaml", "python" or "none".
+      kind: "yaml", "python", "recording" or "none".
       changes: edits since it was read or written.
       can_save: without another name.
       elsewhere: why saving does not simply overwrite it: another program has written it; "" if not.

@@ -32,7 +32,7 @@ async def answer(host: Any, viewer: Viewer, message: m.Request) -> Reply:
     """
     if isinstance(message, m.Ask):
         return m.Answer(message.id, await ask(host, message.what, message.args))
-    if host.read_only:
+    if host.read_only and type(message) not in host.steering.looking:
         raise Refused("read_only", host.read_only)
     value = await _DO[type(message)](host, viewer, message)
     return m.Ack(message.id, host.tables.rev) if value is None else m.Answer(message.id, value)
@@ -130,7 +130,11 @@ async def _reset(host: Host, viewer: Viewer, message: m.Reset) -> None:
 
 
 async def _step(host: Host, viewer: Viewer, message: m.Step) -> dict[str, Any]:
-    return await host.steering.step(message.path)
+    return await host.steering.step(message.path, back=message.back)
+
+
+async def _seek(host: Host, viewer: Viewer, message: m.Seek) -> None:
+    host.steering.seek(message.at)
 
 
 async def _trigger(host: Host, viewer: Viewer, message: m.Trigger) -> None:
@@ -205,6 +209,7 @@ _DO: Final[Mapping[type[m.Request], Callable[[Any, Viewer, Any], Awaitable[Any]]
     m.Proceed: _proceed,
     m.Reset: _reset,
     m.Step: _step,
+    m.Seek: _seek,
     m.Trigger: _trigger,
     m.Act: _act,
     m.Break: _break,

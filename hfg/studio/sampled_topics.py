@@ -18,7 +18,7 @@ from hfg.studio.places import place_at
 from hfg.studio.refusing import Refused
 from hfg.studio.run_topics import RunTopic
 
-__all__ = ["Flows", "LoadTopic", "Measures", "NodeTopic", "SampledTopic", "TimelineTopic", "node_measures"]
+__all__ = ["Flows", "LoadTopic", "Measures", "NodeTopic", "SampledTopic", "TimelineTopic", "node_measures", "packed"]
 
 _FAR_S: Final = 0.5
 _MOST_BOXES: Final = 400
@@ -67,7 +67,7 @@ class Measures(SampledTopic):
         if self.sampler is None:
             return None
         self.sampler.settle()
-        return b"".join(_packed(self.sampler.node(path) or self._far_away(path)) for path in self._nodes)
+        return b"".join(packed(self.sampler.node(path) or self._far_away(path)) for path in self._nodes)
 
     def _far_away(self, path: str) -> Sample | None:
         """Return the last report about a node of another process; asked for twice per second."""
@@ -94,7 +94,8 @@ def _sample_of(said: NodeStatistics) -> Sample:
     )
 
 
-def _packed(sample: Sample | None) -> bytes:
+def packed(sample: Sample | None) -> bytes:
+    """Return what is measured of a node as a page reads it."""
     if sample is None:
         return bytes(_MEASURE.size)
     state = _STATES.get(sample.doing, 0 if sample.doing in _IDLE else 2)

@@ -24,7 +24,7 @@ from hfg.studio.conditions import Looked, condition_text
 from hfg.studio.failing import error_record
 from hfg.studio.messages import Condition
 from hfg.studio.places import place_at
-from hfg.studio.records import BreakpointRecord, RunRecord
+from hfg.studio.records import BreakpointRecord, NodeRecord, ProblemRecord, RunRecord
 from hfg.studio.refusing import Refused
 from hfg.trace import RunEnded, RunPaused, RunResumed, TraceEvent
 
@@ -45,6 +45,18 @@ class Follower(Protocol):
 
     def run_event(self, event: TraceEvent) -> None:
         """Something has changed in it that has to do with no single token."""
+
+    def cursor_moved(self) -> None:
+        """The cursor of a recording is elsewhere: streams are due."""
+
+    def settings_changed(self, paths: Iterable[str]) -> None:
+        """Parameters of these nodes may have other values."""
+
+    def graph_changed(self, graph: Graph, text: str) -> None:
+        """The graph is another one."""
+
+    def problem(self, found: ProblemRecord) -> None:
+        """Something has gone wrong."""
 
 
 class _Stop:
@@ -77,7 +89,12 @@ class Steering:
     Attributes:
       graph: the whole graph.
       run: the current run; None at rest.
+      looking: the requests that change nothing, so that they are for pages that may only look, too.
+      is_live: its graph can run, so it is worth looking for mistakes in it.
     """
+
+    looking: frozenset[type] = frozenset()
+    is_live = True
 
     def __init__(self, graph: Graph, follower: Follower, target: str | bool = False) -> None:
         self.graph = graph
@@ -204,9 +221,15 @@ class Steering:
         """Deactivate all nodes and start over."""
         self._need().reset_activity()
 
-    async def step(self, path: str) -> dict[str, Any]:
+    def seek(self, at_s: float) -> None:
+        """Move the cursor of a recording."""
+        raise Refused("state", "only a recording has a cursor that can be moved, and this is a graph")
+
+    async def step(self, path: str, *, back: bool = False) -> dict[str, Any]:
         """One step of a node, or of all; return what moved."""
         run = self._need()
+        if back:
+            raise Refused("state", "only a recording goes back, and this is a graph")
         if not run.paused:
             raise Refused(
                 "state", "the run is not paused, and only a run that stands still makes steps; pause it first"
@@ -300,6 +323,13 @@ class Steering:
         return {path: stop.record(path, holds=why == path) for path, stop in self._stops.items()}
 
     # --- what is told ---
+
+    def attended(self) -> None:
+        """A page is there."""
+
+    def shown(self, nodes: dict[str, NodeRecord]) -> dict[str, NodeRecord]:
+        """Return the records of nodes as they are at this time."""
+        return nodes
 
     @property
     def record(self) -> RunRecord:

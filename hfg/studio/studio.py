@@ -34,7 +34,10 @@ from hfg.studio.messages import (
     Visible,
 )
 from hfg.studio.project import Project
+from hfg.studio.recorded import Recorded
+from hfg.studio.recorded_topics import RECORDED
 from hfg.studio.refusing import reject
+from hfg.studio.replaying import SENTENCE, Replay
 from hfg.studio.requests import answer
 from hfg.studio.steering import Steering
 from hfg.studio.topics import TOPICS, make_topic
@@ -74,10 +77,13 @@ class Studio(Following):
         run: Run | None = None,
         target: str | bool = False,
         level: str = "",
+        recorded: Recorded | None = None,
     ) -> None:
-        super().__init__(project, Steering(project.graph, self, target))
+        steering = Steering(project.graph, self, target) if recorded is None else Replay(recorded, project.graph, self)
+        super().__init__(project, steering)
+        self._topics = TOPICS if recorded is None else RECORDED
         self.boot = os.urandom(8).hex()
-        self.read_only = read_only
+        self.read_only = read_only if recorded is None else SENTENCE
         self.level = level
         self._count = 0
         self._beating: asyncio.TimerHandle | None = None
@@ -105,7 +111,7 @@ class Studio(Following):
                 version=_version(),
                 read_only=self.read_only,
                 automatic=automatic_ports(),
-                topics=list(TOPICS),
+                topics=list(self._topics),
                 now=time.time(),
                 level=self.level,
             )
@@ -153,6 +159,7 @@ class Studio(Following):
             for patch in missing:
                 viewer.send(patch)
         viewer.joined = True
+        self.steering.attended()
         self.viewers_changed()
         self.layouts_wanted()
         if self._looking is None:
@@ -184,7 +191,7 @@ class Studio(Following):
             viewer.unsubscribe(message.sub, f"a page has {MOST_SUBSCRIPTIONS} subscriptions at most")
             return
         try:
-            topic = make_topic(self, message.topic, message.args)
+            topic = make_topic(self, message.topic, message.args, self._topics)
         except HfgError as error:
             viewer.unsubscribe(message.sub, str(error))
             return

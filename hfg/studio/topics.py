@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import msgspec
 from typing_extensions import override
@@ -23,9 +23,24 @@ from hfg.studio.spans import Ways
 from hfg.studio.tapped_topics import HistoryTopic, ImageTopic, ValueTopic
 from hfg.trace import ActivityChanged, TraceEvent
 
-__all__ = ["TOPICS", "ActivityTopic", "LogTopic", "make_topic"]
+__all__ = [
+    "MOST_NODES",
+    "TOPICS",
+    "ActivityTopic",
+    "Args",
+    "Edges",
+    "Field",
+    "LogTopic",
+    "Nodes",
+    "Nothing",
+    "Path",
+    "Picture",
+    "Topics",
+    "View",
+    "make_topic",
+]
 
-_MOST_NODES: Final = 2000
+MOST_NODES: Final = 2000
 _MOST_MOVES: Final = 256
 _NEAR: Final = 8
 """How many changes of activity before one may be its cause."""
@@ -102,69 +117,83 @@ class LogTopic(RunTopic):
 # --- by name ---
 
 
-class _Args(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class Args(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Arguments of a topic."""
 
 
-class _Nothing(_Args, frozen=True):
-    pass
+class Nothing(Args, frozen=True):
+    """No arguments."""
 
 
-class _Nodes(_Args, frozen=True):
+class Nodes(Args, frozen=True):
+    """Paths of nodes."""
+
     nodes: list[str]
 
 
-class _Edges(_Args, frozen=True):
+class Edges(Args, frozen=True):
+    """Keys of edges."""
+
     edges: list[str]
 
 
-class _Path(_Args, frozen=True):
+class Path(Args, frozen=True):
+    """A node, port or edge."""
+
     path: str
 
 
-class _Picture(_Args, frozen=True):
+class Picture(Args, frozen=True):
+    """A port or edge with pictures, and how large and good they are to be."""
+
     path: str
     size: int = 320
     quality: int = 75
 
 
-class _View(_Args, frozen=True):
+class View(Args, frozen=True):
+    """A view of a node."""
+
     path: str
     name: str
 
 
-class _Field(_Args, frozen=True):
+class Field(Args, frozen=True):
+    """A port or edge, and which part of its values."""
+
     path: str
     field: str = ""
 
 
-TOPICS: Final[Mapping[str, tuple[type[_Args], Callable[[Following, Any], RunTopic]]]] = {
-    "activity": (_Nothing, lambda host, _: ActivityTopic(host)),
-    "measures": (_Nodes, lambda host, args: Measures(host, args.nodes[:_MOST_NODES])),
-    "flow": (_Edges, lambda host, args: Flows(host, args.edges[:_MOST_NODES])),
-    "node": (_Path, lambda host, args: NodeTopic(host, args.path)),
-    "load": (_Nothing, lambda host, _: LoadTopic(host)),
-    "value": (_Path, lambda host, args: ValueTopic(host, args.path)),
+Topics: TypeAlias = Mapping[str, tuple[type[Args], Callable[[Any, Any], RunTopic]]]
+
+TOPICS: Final[Topics] = {
+    "activity": (Nothing, lambda host, _: ActivityTopic(host)),
+    "measures": (Nodes, lambda host, args: Measures(host, args.nodes[:MOST_NODES])),
+    "flow": (Edges, lambda host, args: Flows(host, args.edges[:MOST_NODES])),
+    "node": (Path, lambda host, args: NodeTopic(host, args.path)),
+    "load": (Nothing, lambda host, _: LoadTopic(host)),
+    "value": (Path, lambda host, args: ValueTopic(host, args.path)),
     "image": (
-        _Picture,
+        Picture,
         lambda host, args: ImageTopic(host, args.path, min(max(args.size, 16), 2048), min(max(args.quality, 1), 100)),
     ),
-    "history": (_Field, lambda host, args: HistoryTopic(host, args.path, args.field)),
-    "view": (_View, lambda host, args: SceneTopic(host, args.path, args.name)),
-    "timeline": (_Nothing, lambda host, _: TimelineTopic(host)),
-    "log": (_Nothing, lambda host, _: LogTopic(host)),
+    "history": (Field, lambda host, args: HistoryTopic(host, args.path, args.field)),
+    "view": (View, lambda host, args: SceneTopic(host, args.path, args.name)),
+    "timeline": (Nothing, lambda host, _: TimelineTopic(host)),
+    "log": (Nothing, lambda host, _: LogTopic(host)),
 }
 
 
-def make_topic(host: Following, name: str, args: dict[str, Any]) -> RunTopic:
-    """Make the topic of a subscription.
+def make_topic(host: Following, name: str, args: dict[str, Any], topics: Topics) -> RunTopic:
+    """Make the topic of a subscription, one of those that there are.
 
     Raises:
       HfgError: there is none of this name, or not with these arguments.
     """
-    if name not in TOPICS:
-        raise Refused("unknown", f'a page subscribes to one of {", ".join(TOPICS)}, got "{name:.40}"')
-    fields, make = TOPICS[name]
+    if name not in topics:
+        raise Refused("unknown", f'a page subscribes to one of {", ".join(topics)}, got "{name:.40}"')
+    fields, make = topics[name]
     try:
         return make(host, msgspec.convert(args, fields))
     except msgspec.ValidationError as error:

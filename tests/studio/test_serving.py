@@ -215,7 +215,8 @@ def test_a_page_comes_back_with_its_cookie_after_a_sudden_end_and_not_after_anot
     ("arguments", "says"),
     [
         (("--host", "0.0.0.0"), "write --insecure"),
-        (("run.mcap",), "recordings cannot be opened in the studio yet"),
+        (("run.mcap",), "cannot open the recording run.mcap: No such file or directory"),
+        (("--into", "robot.py"), "--into names the graph of a recording"),
         (("--attach", "99999999"), "no graph that could be looked at runs in process 99999999"),
         (("missing.hfg.yaml",), "missing.hfg.yaml"),
     ],
