@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import hfg
-from hfg.studio.project import Project
+from hfg.studio.project import Project, RecordedProject
+from hfg.studio.recorded import Recorded
 from hfg.studio.serving import Server, StudioDoor
 from hfg.studio.studio import Studio
 from tests.limits import patience
@@ -28,13 +29,23 @@ _LOOK_EVERY_S = 0.02
 class Bench:
     """A studio on a loop of its own, in a thread as a user's program would have it."""
 
-    def __init__(self, graph: hfg.Graph, folder: Path, file: Path | None = None, read_only: str = "") -> None:
+    def __init__(
+        self,
+        graph: hfg.Graph,
+        folder: Path,
+        file: Path | None = None,
+        read_only: str = "",
+        recording: Path | None = None,
+    ) -> None:
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="studio of a story", daemon=True)
         self._thread.start()
+        recorded = None if recording is None else Recorded(recording)
         self._project = Project(graph, folder, file, allow=("tests.studio.stories",))
+        if recorded is not None and recording is not None:
+            self._project = RecordedProject(recorded.graph_after(0), recording)
         self._read_only = read_only
-        self.studio: Studio = self.call(lambda: Studio(self._project, read_only=read_only))
+        self.studio: Studio = self.call(lambda: Studio(self._project, read_only=read_only, recorded=recorded))
         self.server = self._serve(None)
         self.address = self.server.address
 

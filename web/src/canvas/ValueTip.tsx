@@ -2,6 +2,7 @@ import { useEffect, useState } from "react";
 import type { Value } from "../protocol/types";
 import { pin } from "../state/actions";
 import { socket } from "../state/link";
+import { valueSeen } from "../state/looking";
 import { useStudio } from "../state/studio";
 import { moment, rate } from "../ui/words";
 import { useTip } from "./tips";
@@ -17,7 +18,7 @@ export function ValueTip() {
     setValue(null);
     setWhy("");
     if (path === null) return;
-    const subscription = socket.subscribe("value", { path }, 4, (next, time) => setValue({ ...(next as Value), time }), setWhy);
+    const subscription = socket.subscribe("value", { path }, 4, (next, time) => setValue(valueSeen(next, time)), setWhy);
     const key = (event: KeyboardEvent) => {
       if (event.key.toLowerCase() === "p" && !event.ctrlKey && !(event.target instanceof HTMLInputElement)) {
         event.stopImmediatePropagation();

@@ -4,13 +4,14 @@ import { paintMeasures } from "../live/measures";
 import type { NodeMeasures } from "../protocol/types";
 import { socket } from "../state/link";
 import { useStudio } from "../state/studio";
+import { isRecording } from "../state/looking";
 import { counted, duration } from "../ui/words";
 
 export function Measured({ path }: { path: string }) {
   const [facts, setFacts] = useState<NodeMeasures | null>(null);
   const canvas = useRef<HTMLCanvasElement>(null);
   const isSubgraph = useStudio((s) => s.tables.nodes[path]?.subgraph ?? false);
-  const runs = useStudio((s) => s.tables.studio.run?.state !== "rest");
+  const runs = useStudio((s) => s.tables.studio.run?.state !== "rest" && !isRecording(s.tables.studio.run));
 
   useEffect(() => {
     setFacts(null);

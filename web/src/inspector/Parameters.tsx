@@ -1,5 +1,5 @@
 import { useStudio } from "../state/studio";
-import { limitOf } from "../state/looking";
+import { isRecording, limitOf } from "../state/looking";
 import type { ParameterType } from "../protocol/types";
 import { Parameter } from "./Parameter";
 import { ActiveLimit } from "./ActiveLimit";
@@ -7,6 +7,7 @@ import { ActiveLimit } from "./ActiveLimit";
 export function Parameters({ path }: { path: string }) {
   const node = useStudio((s) => s.tables.nodes[path]);
   const type = useStudio((s) => s.tables.types[node?.type ?? ""]);
+  const recording = useStudio((s) => isRecording(s.tables.studio.run));
   const limit = limitOf(node);
   if (!node) return null;
   const shown = (type?.parameters ?? []).filter((one) => node.shown.includes(one.name));
@@ -17,7 +18,7 @@ export function Parameters({ path }: { path: string }) {
     <div className="sec">
       <h3>
         Parameters<span className="sp" />
-        <small>change at once, undoable</small>
+        <small>{recording ? "at the cursor" : "change at once, undoable"}</small>
       </h3>
       {[...groups].map(([group, members]) => (
         <div key={group}>

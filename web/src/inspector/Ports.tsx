@@ -28,9 +28,9 @@ function PortRow({ port }: { port: PortRecord }) {
   const pinned = useStudio((s) => s.pins.includes(port.path));
   useEffect(() => {
     const subscription = socket.subscribe("value", { path: port.path }, 4, (next) => {
-      const one = next as Value;
-      if (value.current) value.current.textContent = one.kind === "none" || one.kind === "marker" ? "" : one.summary;
-      if (speed.current) speed.current.textContent = one.seen > 0 ? rate(one.rate_hz) : "never";
+      const one = next as Value | null;
+      if (value.current) value.current.textContent = one === null || one.kind === "none" || one.kind === "marker" ? "" : one.summary;
+      if (speed.current) speed.current.textContent = one !== null && one.seen > 0 ? rate(one.rate_hz) : "never";
     });
     return subscription.end;
   }, [port.path]);

@@ -1,5 +1,7 @@
 import type { View } from "../state/studio";
 import { change, studio } from "../state/studio";
+import { seek, stepTo } from "../live/replay";
+import { isRecording } from "../state/looking";
 import * as act from "../state/actions";
 import { record, useWindow } from "../timeline/store";
 
@@ -29,11 +31,20 @@ const twice = async () => act.pasteText(await act.copyAsText(act.chosen()));
 
 function toActivityChange(way: 1 | -1): void {
   const { follows, end, length } = useWindow.getState();
-  const now = follows ? record.now : end;
+  const now = record.cursor ?? (follows ? record.now : end);
   const times = record.spans.map((span) => span[1]).sort((a, b) => a - b);
   const next = way === 1 ? times.find((time) => time > now + 1e-6) : times.findLast((time) => time < now - 1e-6);
-  if (next !== undefined) useWindow.setState({ follows: false, end: next, length });
+  if (next === undefined) return;
+  if (record.cursor === null) useWindow.setState({ follows: false, end: next, length });
+  else seek(next);
 }
+
+function followOrNot(): void {
+  const { follows, end } = useWindow.getState();
+  useWindow.setState({ follows: !follows, end: record.cursor === null ? record.now : end });
+}
+
+const replays = () => act.unsteerable() || (isRecording(studio().tables.studio.run) ? "" : "Only a recording goes back.");
 
 function leaveSomething(): void {
   const { menu, popover, acting, selectedEdge, selection, panel, level } = studio();
@@ -46,9 +57,11 @@ function leaveSomething(): void {
 export const DOINGS: Doing[] = [
   { name: "Add a node", keys: "Tab", off: edits(), run: () => window.dispatchEvent(new CustomEvent("hfg-add")) },
   { name: "Find or do anything", keys: "Ctrl+K", run: () => change({ popover: "commands" }) },
-  { name: "Pause, go on, start", keys: "Space", off: edits(), run: act.pauseOrGo },
-  { name: "Step a wave", keys: ".", off: edits(), run: () => void act.step("") },
-  { name: "Step a firing of the selected node", keys: ",", off: edits(none), run: () => void act.step(first()) },
+  { name: "Pause, go on, start", keys: "Space", off: act.unsteerable, run: act.pauseOrGo },
+  { name: "To the firing before, of a recording", keys: "ArrowLeft", off: replays, run: () => void stepTo(true) },
+  { name: "To the next firing, of a recording", keys: "ArrowRight", off: replays, run: () => void stepTo(false) },
+  { name: "Step a wave", keys: ".", off: act.unsteerable, run: () => void act.step("") },
+  { name: "Step a firing of the selected node", keys: ",", off: () => act.unsteerable() || none(), run: () => void act.step(first()) },
   { name: "Stop the run", keys: "Shift+Escape", off: edits(), run: () => void act.tell("stop") },
   { name: "Reset the activity", keys: "", off: edits(), run: () => void act.tell("reset") },
   { name: "Set or clear a breakpoint", keys: "F9", off: nothing, run: () => void act.toggleBreak(first() || studio().selectedEdge!) },
@@ -75,7 +88,7 @@ export const DOINGS: Doing[] = [
   { name: "View: activity", keys: "1", run: view("activity") },
   { name: "View: mission", keys: "2", run: view("mission") },
   { name: "View: all edges", keys: "3", run: view("all") },
-  { name: "Follow live", keys: "L", run: () => useWindow.setState((s) => ({ follows: !s.follows, end: record.now })) },
+  { name: "Follow live", keys: "L", run: followOrNot },
   { name: "To the change of activity before", keys: "[", run: () => toActivityChange(-1) },
   { name: "To the change of activity after", keys: "]", run: () => toActivityChange(1) },
   { name: "Outline", keys: "O", run: () => change({ panel: studio().panel === "outline" ? null : "outline" }) },

@@ -1,5 +1,6 @@
 import { useEffect } from "react";
 import { chosen, edit, locked, newGesture, select, toast } from "../state/actions";
+import { isRecording } from "../state/looking";
 import { edgeKey, endsOf, nodeOf } from "../state/paths";
 import { change, layoutKey, studio } from "../state/studio";
 import { DOINGS, written } from "./commands";
@@ -25,7 +26,8 @@ export function useKeys(): void {
       }
       if (studio().popover !== null && keys !== "Escape") return;
       const arrow = ARROWS[event.key];
-      if (arrow && !event.ctrlKey) {
+      const steps = arrow?.[1] === 0 && !event.shiftKey && isRecording(studio().tables.studio.run);
+      if (arrow && !event.ctrlKey && !steps) {
         if (event.shiftKey) moveBy(arrow[0] * 8, arrow[1] * 8, event.repeat);
         else if (!along(arrow)) return;
         event.preventDefault();

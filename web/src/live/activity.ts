@@ -7,6 +7,8 @@ export interface ActivityFrame {
   active: Record<string, number>;
   moves: Move[];
   lost?: number;
+  /** The cursor of a recording has jumped: nothing moves along the lines. */
+  still?: boolean;
 }
 
 /** How long a pulse runs along the line before the ring appears at its end. */
@@ -33,7 +35,7 @@ export function watchActivity(): void {
 function heard(frame: ActivityFrame): void {
   for (const act of listeners) act(frame);
   const ways = waysOf(frame.moves);
-  const calm = ways.length === 0 || still.matches || document.hidden;
+  const calm = ways.length === 0 || frame.still === true || still.matches || document.hidden;
   const next = { since: frame.active, ways: ways.length > 0 ? lastWays(frame.moves) : studio().activity.ways };
   if (calm) {
     show(next);

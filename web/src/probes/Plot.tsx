@@ -18,7 +18,7 @@ export function Plot({ path }: { path: string }) {
     let times: number[] = [];
     let values: number[] = [];
     const paint = () => canvas.current && draw(canvas.current, times, values);
-    const subscription = socket.subscribe("history", { path, n: 2000 }, 15, (next) => {
+    const subscription = socket.subscribe("history", { path }, 15, (next) => {
       const more = next as Numbers;
       if (more.fresh) [times, values] = [[], []];
       times.push(...more.times);

@@ -2,6 +2,7 @@ import { useEffect, useState } from "react";
 import type { Data, Value } from "../protocol/types";
 import { pin } from "../state/actions";
 import { socket } from "../state/link";
+import { valueSeen } from "../state/looking";
 import { Icon } from "../ui/Icon";
 import { moment, rate, short } from "../ui/words";
 import { ImageView } from "./ImageView";
@@ -11,7 +12,7 @@ import { Plot } from "./Plot";
 export function Probe({ path }: { path: string }) {
   const [value, setValue] = useState<Value | null>(null);
   const [why, setWhy] = useState("");
-  useEffect(() => socket.subscribe("value", { path }, 4, (next, time) => setValue({ ...(next as Value), time }), setWhy).end, [path]);
+  useEffect(() => socket.subscribe("value", { path }, 4, (next, time) => setValue(valueSeen(next, time)), setWhy).end, [path]);
   const shape = value?.shape ? ` · ${[...value.shape].join("×")}` : "";
   return (
     <section className="probe" aria-label={`Probe of ${path}`}>

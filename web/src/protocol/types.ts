@@ -243,6 +243,8 @@ export interface RunRecord {
   number: number;
   steerable: boolean;
   clock: string;
+  /** Of a recording, how long it is. */
+  length_s?: number | null;
 }
 
 export interface HistoryStep {
@@ -264,7 +266,7 @@ export interface FileRecord {
   name: string;
   path: string;
   folder: string;
-  kind: "yaml" | "python" | "none";
+  kind: "yaml" | "python" | "recording" | "none";
   changes: number;
   can_save: boolean | string;
   elsewhere: string;

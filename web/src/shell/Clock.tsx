@@ -1,5 +1,5 @@
 import { useEffect, useRef } from "react";
-import { elapsed } from "../state/looking";
+import { elapsed, isRecording } from "../state/looking";
 import { studio, useStudio } from "../state/studio";
 import type { RunRecord } from "../protocol/types";
 import { clock } from "../ui/words";
@@ -16,7 +16,7 @@ export function Clock() {
       text.current.textContent = clock(elapsed(state.tables.studio.run, state.clockOffset));
     };
     paint();
-    const timer = setInterval(paint, 250);
+    const timer = setInterval(paint, isRecording(run) ? 50 : 250);
     return () => clearInterval(timer);
   }, [run]);
 
@@ -33,6 +33,7 @@ export function Clock() {
 
 function says(run: RunRecord | undefined): string {
   if (!run || run.state === "rest") return "at rest";
+  if (isRecording(run)) return `of ${clock(run.length_s ?? 0)}`;
   if (run.state === "ended") return "ended";
   if (run.state === "paused") return run.why && run.why !== "pause" ? `held at ${run.why}` : "paused";
   if (run.state === "running") return run.clock === "real" ? "real time" : `${run.clock} time`;
@@ -48,6 +49,7 @@ function Live() {
   const lock = readOnly !== "" && <span title={readOnly}>look only</span>;
   if (phase === "connecting") return <span className="live off">connecting</span>;
   if (age > 0) return <span className="live off">away {seconds} s</span>;
+  if (isRecording(run)) return <span className="live off">recording</span>;
   if (run?.state === "ended" && run.outcome === "failed") return <span className="live bad">failed</span>;
   if (run?.state === "ended") return <span className="live off">{run.outcome || "ended"}</span>;
   if (!run || run.state === "rest") return <span className="live off">ready {lock}</span>;

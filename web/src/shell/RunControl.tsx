@@ -1,9 +1,37 @@
-import { chosen, locked, pauseOrGo, step, tell } from "../state/actions";
+import { stepTo } from "../live/replay";
+import { chosen, locked, pauseOrGo, step, tell, unsteerable } from "../state/actions";
+import { isRecording } from "../state/looking";
 import { useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
 
 /** Pause and go on, a wave, a firing, stop: in the middle of the bar, where they stay in the narrowest window. */
 export function RunControl() {
+  const recording = useStudio((s) => isRecording(s.tables.studio.run));
+  return recording ? <Player /> : <Steering />;
+}
+
+/** Of a recording: back a firing, play or pause, on a firing. */
+function Player() {
+  const plays = useStudio((s) => s.tables.studio.run?.state === "running");
+  useStudio((s) => s.age === 3);
+  const off = unsteerable() !== "";
+  const goes = plays ? "Pause (Space)" : "Play (Space)";
+  return (
+    <span className="group" role="group" aria-label="Recording" title={unsteerable() || undefined}>
+      <button type="button" className="btn" title="To the firing before (←)" aria-label="To the firing before" disabled={off} onClick={() => void stepTo(true)}>
+        <Icon name="back" />
+      </button>
+      <button type="button" className="btn" title={goes} aria-label={goes} disabled={off} onClick={pauseOrGo}>
+        <Icon name={plays ? "pause" : "play"} />
+      </button>
+      <button type="button" className="btn" title="To the next firing (→)" aria-label="To the next firing" disabled={off} onClick={() => void stepTo(false)}>
+        <Icon name="wave" />
+      </button>
+    </span>
+  );
+}
+
+function Steering() {
   const state = useStudio((s) => s.tables.studio.run?.state ?? "rest");
   const one = useStudio((s) => (s.selection.size === 1 ? [...s.selection][0]! : ""));
   useStudio((s) => s.age === 3); // the buttons lock with the edits

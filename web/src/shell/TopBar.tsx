@@ -97,7 +97,7 @@ function FileName() {
   if (!file || file.kind === "none") return null;
   const changes = file.changes;
   return (
-    <span className="filename num hide-n" title={changes > 0 ? `${changes} not saved (Ctrl+S)` : "saved"}>
+    <span className="filename num hide-n" title={file.kind === "recording" ? "a recording, which does not change" : changes > 0 ? `${changes} not saved (Ctrl+S)` : "saved"}>
       {file.name}
       {changes > 0 && (
         <>

@@ -2,6 +2,7 @@ import { Refusal } from "../protocol/socket";
 import type { ActionRecord, Command, Data, FoundRow, Message } from "../protocol/types";
 import { socket, showLevel } from "./link";
 import { edgeKey, endsOf, isInside, joined, nameOf, parentOf } from "./paths";
+import { isRecording } from "./looking";
 import { change, studio, type Toast, type View } from "./studio";
 
 let toasts = 0;
@@ -88,8 +89,15 @@ export const chosen = (): string[] => [...studio().selection];
 
 /** Whether nothing may be changed now, and why. */
 export function locked(): string {
-  const { hello, age, phase } = studio();
-  if (hello?.read_only) return hello.read_only;
+  const { hello } = studio();
+  return hello?.read_only || waits();
+}
+
+/** Whether the run cannot be steered now, and why; a recording can be played by everyone who looks at it. */
+export const unsteerable = (): string => (isRecording(studio().tables.studio.run) ? waits() : locked());
+
+function waits(): string {
+  const { age, phase } = studio();
   if (age === 3 || phase === "closed") return "Edits wait until the studio answers.";
   return "";
 }

@@ -1,4 +1,4 @@
-import type { NodeRecord, RunRecord, Tables } from "../protocol/types";
+import type { NodeRecord, RunRecord, Tables, Value } from "../protocol/types";
 import { isInside } from "./paths";
 import type { Activity } from "./studio";
 
@@ -20,10 +20,13 @@ export function limitOf(node: NodeRecord | undefined): number | null {
   return typeof limit === "number" ? limit : null;
 }
 
+export const isRecording = (run: RunRecord | undefined): boolean => typeof run?.length_s === "number";
+
 export function elapsed(run: RunRecord | undefined, clockOffset: number): number {
   if (!run) return 0;
   const moving = run.state === "running" || run.state === "stepping";
-  return run.elapsed_s + (moving && run.clock === "real" ? Math.max(0, Date.now() / 1000 + clockOffset - run.at) : 0);
+  const now = run.elapsed_s + (moving && run.clock === "real" ? Math.max(0, Date.now() / 1000 + clockOffset - run.at) : 0);
+  return Math.min(now, run.length_s ?? Number.POSITIVE_INFINITY);
 }
 
 /** The number of a group gives its colour; from the fifth on the four colours come again with another stripe. */
@@ -33,3 +36,7 @@ export function groupClass(tables: Tables, group: string): string {
   const colour = `g${((number - 1) % 4) + 1}`;
   return number > 4 ? `${colour} again${Math.floor((number - 1) / 4)}` : colour;
 }
+
+/** A value with the time at which it was seen: a recording says when it was sent. Before the first one there is none. */
+export const valueSeen = (next: unknown, time: number): Value | null =>
+  next === null ? null : { ...(next as Value), time: (next as Partial<Value>).time ?? time };

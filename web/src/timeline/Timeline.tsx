@@ -1,4 +1,5 @@
 import { type PointerEvent, useEffect, useRef, type WheelEvent } from "react";
+import { seek } from "../live/replay";
 import { show, select } from "../state/actions";
 import { parentOf } from "../state/paths";
 import { studio, useStudio } from "../state/studio";
@@ -19,6 +20,7 @@ export function Timeline() {
     if (canvas.current) drawTimeline(canvas.current, true);
     let request = requestAnimationFrame(function frame() {
       if (canvas.current) drawTimeline(canvas.current);
+      if (canvas.current && record.cursor !== null) noteTimes(canvas.current);
       request = requestAnimationFrame(frame);
     });
     return () => cancelAnimationFrame(request);
@@ -30,16 +32,23 @@ export function Timeline() {
   };
   const wheel = (event: WheelEvent<HTMLCanvasElement>) => {
     const { x } = place(event);
+    const across = event.shiftKey ? event.deltaY : event.deltaX;
+    if (record.cursor !== null && across !== 0) {
+      const end = scale.begin + scale.length * (1 + across / (scale.width - GUTTER));
+      useWindow.setState({ follows: false, end: Math.min(Math.max(end, scale.length), Math.max(record.now, scale.length)) });
+      return;
+    }
     const length = Math.min(Math.max(LEAST_S, scale.length * Math.exp(event.deltaY * 0.0015)), Math.max(14, record.now));
     const { follows } = useWindow.getState();
     const at = timeAt(Math.max(GUTTER, x));
     const share = (at - scale.begin) / scale.length;
-    useWindow.setState({ length, end: follows ? record.now : at + (1 - share) * length });
+    useWindow.setState({ length, end: follows && record.cursor === null ? record.now : at + (1 - share) * length });
   };
   const down = (event: PointerEvent<HTMLCanvasElement>) => {
     const { x, y } = place(event);
     event.currentTarget.setPointerCapture(event.pointerId);
     drag.current = { x, end: scale.begin + scale.length, moved: false, overview: y < OVERVIEW_PX };
+    if (record.cursor !== null) scrub(x, y < OVERVIEW_PX);
   };
   const move = (event: PointerEvent<HTMLCanvasElement>) => {
     const begun = drag.current;
@@ -47,6 +56,10 @@ export function Timeline() {
     const { x } = place(event);
     if (!begun.moved && Math.abs(x - begun.x) < 4) return;
     begun.moved = true;
+    if (record.cursor !== null) {
+      scrub(x, begun.overview);
+      return;
+    }
     if (begun.overview) {
       const middle = overviewTimeAt(x);
       useWindow.setState({ follows: false, end: Math.min(record.now, middle + scale.length / 2) });
@@ -75,6 +88,20 @@ export function Timeline() {
       onPointerUp={up}
     />
   );
+}
+
+/** What the picture says, for those who do not see it, and for tests. */
+function noteTimes(canvas: HTMLCanvasElement): void {
+  canvas.dataset.cursor = String(+(record.cursor ?? 0).toFixed(3));
+  canvas.dataset.length = String(+record.now.toFixed(3));
+}
+
+/** Puts the cursor of a recording where the mouse is; from the overview, with the window around it. */
+function scrub(x: number, overview: boolean): void {
+  const at = overview ? overviewTimeAt(x) : timeAt(Math.max(GUTTER, x));
+  const end = Math.min(Math.max(at + scale.length / 2, scale.length), Math.max(record.now, scale.length));
+  if (overview) useWindow.setState({ end });
+  seek(at);
 }
 
 /** Nothing jumps unless asked: a node elsewhere is selected there, and marked on the subgraph around it here. */

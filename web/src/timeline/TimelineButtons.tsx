@@ -1,3 +1,5 @@
+import { isRecording } from "../state/looking";
+import { useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
 import { record, useWindow } from "./store";
 
@@ -5,8 +7,9 @@ const LENGTHS = [0.3, 1, 3, 14, 60, 300];
 
 export function TimelineButtons() {
   const { follows, length } = useWindow();
-  const label = length >= 2 ? `last ${Math.round(length)} s` : `last ${Math.round(length * 1000)} ms`;
-  const toggle = () => useWindow.setState({ follows: !follows, end: record.now });
+  const recording = useStudio((s) => isRecording(s.tables.studio.run));
+  const last = (seconds: number) => `${recording ? "" : "last "}${seconds >= 2 ? `${Math.round(seconds)} s` : `${Math.round(seconds * 1000)} ms`}`;
+  const toggle = () => useWindow.setState(recording ? { follows: !follows } : { follows: !follows, end: record.now });
   return (
     <>
       <button
@@ -14,7 +17,7 @@ export function TimelineButtons() {
         className="btn small line"
         aria-pressed={follows}
         style={follows ? { color: "var(--you)", borderColor: "var(--you)" } : undefined}
-        title="Follow live (L)"
+        title={recording ? "Keep the cursor in view (L)" : "Follow live (L)"}
         onClick={toggle}
       >
         <Icon name="follow" />
@@ -24,13 +27,13 @@ export function TimelineButtons() {
         <select
           aria-label="Length of the window"
           value={LENGTHS.includes(length) ? length : ""}
-          onChange={(event) => useWindow.setState({ length: Number(event.target.value) })}
+          onChange={(event) => widen(Number(event.target.value))}
           style={{ border: 0, background: "none" }}
         >
-          {!LENGTHS.includes(length) && <option value="">{label}</option>}
+          {!LENGTHS.includes(length) && <option value="">{last(length)}</option>}
           {LENGTHS.map((one) => (
             <option key={one} value={one}>
-              {one >= 2 ? `last ${one} s` : `last ${one * 1000} ms`}
+              {last(one)}
             </option>
           ))}
         </select>
@@ -40,6 +43,12 @@ export function TimelineButtons() {
       </button>
     </>
   );
+}
+
+/** Shows more or less of the time around the cursor, or up to the end of the run. */
+function widen(length: number): void {
+  const end = Math.min(Math.max((record.cursor ?? 0) + length / 2, length), Math.max(record.now, length));
+  useWindow.setState(record.cursor === null ? { length } : { length, end });
 }
 
 /** The boxes that the page has, in the trace format of Chrome and Perfetto. */

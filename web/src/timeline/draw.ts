@@ -56,7 +56,7 @@ export function drawTimeline(canvas: HTMLCanvasElement, again = false): void {
   }
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   const { follows, length, end } = useWindow.getState();
-  const right = follows ? Math.max(record.now, length) : end;
+  const right = follows && record.cursor === null ? Math.max(record.now, length) : end;
   scale = { begin: right - length, length, width };
   targets = [];
   new Drawing(context, width, height).all();
@@ -76,9 +76,9 @@ class Drawing {
     this.c.fillRect(0, 0, this.width, this.height);
     this.c.textBaseline = "middle";
     const { spans, prefix } = withoutCommon(record.spans);
-    this.overview(steps(spans, record.now), prefix);
+    this.overview(steps(spans, record.now, record.cursor), prefix);
     this.axis();
-    this.activity(icicle(spans, scale.begin, record.now), prefix);
+    this.activity(icicle(spans, scale.begin, record.now, 3, record.cursor), prefix);
     if (this.height > 110) this.lanes();
     this.playhead();
   }
@@ -118,6 +118,10 @@ class Drawing {
     const left = at(Math.max(0, scale.begin));
     this.c.strokeRect(left, 4, Math.max(2, at(scale.begin + scale.length) - left), 20);
     this.c.lineWidth = 1;
+    if (record.cursor !== null) {
+      this.c.fillStyle = colour("you");
+      this.c.fillRect(at(record.cursor) - 1, 3, 2, 22);
+    }
   }
 
   private axis(): void {
@@ -164,7 +168,7 @@ class Drawing {
       this.c.fillRect(12, y + 5, 8, 8);
       this.text(group.name, 26, y + 9.5, "ink2", 600);
       this.c.textAlign = "right";
-      this.text(percent(loads[group.name]?.busy_share ?? 0), GUTTER - 8, y + 9.5, "ink3");
+      if (record.cursor === null) this.text(percent(loads[group.name]?.busy_share ?? 0), GUTTER - 8, y + 9.5, "ink3");
       this.c.textAlign = "left";
       this.c.fillStyle = colour("line");
       this.c.fillRect(GUTTER, y + 15, this.width - GUTTER - RIGHT, 1);
@@ -180,8 +184,9 @@ class Drawing {
   private box([node, , begin, end]: Box, y: number, token: string): void {
     if (end < scale.begin || begin > scale.begin + scale.length) return;
     const left = Math.max(GUTTER, this.x(begin));
-    const wide = Math.max(1, this.x(end) - left);
-    const tall = scale.length < 3 ? 13 : Math.max(3, 13 * Math.min(1, Math.max(0.28, (end - begin) / SLOWEST_S)));
+    const mark = end === begin; // of a recording, which does not know how long it took
+    const wide = Math.max(mark ? 2 : 1, this.x(end) - left);
+    const tall = mark ? 11 : scale.length < 3 ? 13 : Math.max(3, 13 * Math.min(1, Math.max(0.28, (end - begin) / SLOWEST_S)));
     const chosen = this.isChosen(node);
     this.c.fillStyle = colour(chosen && wide < RING_PX ? "you" : token);
     this.c.fillRect(left, y + 15 - tall, wide, tall);
@@ -206,7 +211,27 @@ class Drawing {
     this.c.lineWidth = 1;
   }
 
+  /** The time that a recording shows: put by the person, so it is blue. */
+  private cursor(at: number): void {
+    const x = this.x(at);
+    if (x < GUTTER - 1 || x > this.width - RIGHT + 1) return;
+    const words = `${at.toFixed(scale.length < 3 ? 3 : 2)} s`;
+    this.c.font = `600 11px ${colour("font")}`;
+    const wide = this.c.measureText(words).width + 10;
+    const left = Math.min(Math.max(GUTTER, x - wide / 2), this.width - wide - 2);
+    this.c.fillStyle = colour("you");
+    this.c.fillRect(Math.round(x) - 1, 40, 2, this.height - 40);
+    this.c.beginPath();
+    this.c.roundRect(left, 26, wide, 15, 3);
+    this.c.fill();
+    this.text(words, left + 5, 34, "surface", 600);
+  }
+
   private playhead(): void {
+    if (record.cursor !== null) {
+      this.cursor(record.cursor);
+      return;
+    }
     const x = this.x(record.now);
     if (x < GUTTER || x > this.width) return;
     const active = Object.keys(studio().activity.since).length > 0;

@@ -11,8 +11,9 @@ export interface Piece {
 /** Spans closer than this are one: handing activity over takes no time that one could see. */
 const GAP_S = 0.05;
 
-/** Three rows: the step of the mission, what is inside of it, and the innermost, with the rest of its path. */
-export function icicle(spans: readonly Span[], from: number, now: number, rows = 3): Piece[][] {
+/** Three rows: the step of the mission, what is inside of it, and the innermost, with the rest of its path.
+ * What is active at a time is now, else what has no end. */
+export function icicle(spans: readonly Span[], from: number, now: number, rows = 3, at: number | null = null): Piece[][] {
   const found: Piece[][] = Array.from({ length: rows }, () => []);
   const sorted = [...spans].filter(([, , end]) => end === null || end >= from).sort((a, b) => a[1] - b[1]);
   for (const [path, begin, end] of sorted) {
@@ -22,7 +23,7 @@ export function icicle(spans: readonly Span[], from: number, now: number, rows =
       if (last && parts.length > rows && row !== rows - 1) return;
       const key = last ? path : parts.slice(0, row + 1).join("/");
       const name = last && parts.length > rows ? parts.slice(rows - 1).join(" › ") : part;
-      const piece = { path: key, name, begin, end: end ?? now, now: end === null };
+      const piece = { path: key, name, begin, end: end ?? now, now: at === null ? end === null : begin <= at && at < (end ?? Number.POSITIVE_INFINITY) };
       const before = found[row]!.at(-1);
       if (before && before.path === key && begin - before.end < GAP_S) {
         before.end = Math.max(before.end, piece.end);
@@ -34,9 +35,9 @@ export function icicle(spans: readonly Span[], from: number, now: number, rows =
 }
 
 /** The steps of the mission alone: the first names of the paths, one after the other. */
-export function steps(spans: readonly Span[], now: number): Piece[] {
+export function steps(spans: readonly Span[], now: number, at: number | null = null): Piece[] {
   const short = spans.map(([path, begin, end]): Span => [path.split("/")[0]!, begin, end]);
-  return icicle(short, 0, now, 1)[0]!;
+  return icicle(short, 0, now, 1, at)[0]!;
 }
 
 /** Leaves out levels that all spans share, such as the only robot. */
@@ -53,6 +54,8 @@ export function withoutCommon(spans: readonly Span[]): { spans: Span[]; prefix: 
 }
 
 export function tickStep(length: number): number {
+  if (length > 20_000) return 3600;
+  if (length > 3000) return 600;
   if (length > 300) return 60;
   if (length > 60) return 10;
   if (length > 20) return 5;

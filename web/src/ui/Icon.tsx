@@ -2,6 +2,7 @@
 const PATHS = {
   pause: '<path d="M5 3v10M11 3v10" stroke-width="2.5"/>',
   play: '<path d="M5 3l8 5-8 5z" fill="currentColor"/>',
+  back: '<path d="M13 3v10M10 4l-7 4 7 4z"/>',
   wave: '<path d="M3 3v10M6 4l7 4-7 4z"/>',
   step: '<path d="M8 2v6m-3-3 3 3 3-3"/><circle cx="8" cy="12.5" r="1.8"/>',
   stop: '<rect x="4" y="4" width="8" height="8" rx="1" fill="currentColor"/>',
