@@ -14,7 +14,7 @@ RESULTS := benchmarks/results
 PEERS   := .venv-peers
 
 .DEFAULT_GOAL := help
-.PHONY: help demo studio photographs test test-fast lint bench peers bench-peers bench-goals bench-docs bench-links docs docs-nodes docs-drawings docs-mermaid docs-studio web test-web soak setup clean
+.PHONY: help demo studio photographs test test-fast lint bench peers bench-peers bench-goals bench-docs bench-links bench-studio docs docs-nodes docs-drawings docs-mermaid docs-studio web test-web soak setup clean
 
 help:
 	@echo "make demo    a robot fetches and delivers cubes; score, video and report in out/fetch_delivery, in less than 3 minutes"
@@ -24,7 +24,7 @@ help:
 	@echo "make test-fast   run those that take no time, in half a minute"
 	@echo "make lint    ruff, mypy and the check of our English"
 	@echo "make bench   run the benchmarks (bench-peers: with other libraries; bench-docs: write docs/speed.md;"
-	@echo "             bench-goals: the goals, and whether they are reached; bench-links: between processes)"
+	@echo "             bench-goals: the goals, and whether they are reached; bench-links: between processes; bench-studio: the page)"
 	@echo "make docs    build the documentation as a site in build/site"
 	@echo "make docs-nodes   write docs/nodes from the docstrings of the library"
 	@echo "make docs-drawings   redraw the graphs in README and docs"
@@ -80,6 +80,10 @@ bench-goals: peers
 
 bench-links: peers
 	$(PEERS)/bin/python -m benchmarks bench_links --json $(RESULTS)
+
+# Needs Chromium.
+bench-studio: $(READY)
+	$(BIN)/python -m benchmarks bench_studio --json $(RESULTS)
 
 bench-docs: $(READY)
 	$(BIN)/python -m benchmarks.page $(RESULTS)

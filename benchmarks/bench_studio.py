@@ -9,14 +9,25 @@ Not measured: a graphics card, other browsers, a network between page and studio
 
 from __future__ import annotations
 
+import asyncio
+import multiprocessing
+import os
+import time
 from collections.abc import Callable
 from functools import partial
 from math import cos, sin
+from multiprocessing.synchronize import Event
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from benchmarks.browser import CHROMIUM, Looker, StudioProcess, browsers, percentile
+from benchmarks.browser import CHROMIUM, Looker, StudioProcess, browsers, percentile, resident_mb
+from benchmarks.crowd import build
 from benchmarks.goals import Goal, Side
 from benchmarks.measure import Case
+from hfg.studio.project import Project
+from hfg.studio.serving import Server, StudioDoor
+from hfg.studio.studio import Studio
 
 DISTRIBUTIONS = ("hfg", "playwright")
 RUNS = 3
@@ -101,21 +112,19 @@ def open_palette(looker: Looker, times: int) -> list[float]:
 
 
 def type_letters(looker: Looker, times: int) -> list[float]:
-    """Type into the palette: the rows that answer are there."""
+    """Type the last letter of a word into the palette: the rows that answer are there."""
     took = []
     looker.page.locator("#canvas").focus()
     looker.page.keyboard.press("Tab")
     looker.page.locator(".palette li b").first.wait_for()
-    word = ("threshold" * times)[: max(times, 9)]
-    for number, letter in enumerate(word):
-        if number % 9 == 0:
-            looker.page.locator(".palette input").fill("")
-            looker.page.wait_for_timeout(2 * PAUSE_MS)
-        field = "document.querySelector('.palette input')"
-        answers = f"{field}.value.length === {number % 9 + 1} && {field}.hasAttribute('aria-activedescendant')"
-        took.append(looker.takes("keydown", answers, partial(looker.page.keyboard.press, letter)))
+    field = looker.page.locator(".palette input")
+    for number in range(times):
+        word = ("threshold", "circle", "blur", "gate")[number % 4]
+        field.fill(word[:-1])
+        looker.page.wait_for_timeout(2 * PAUSE_MS)
+        answers = f"document.querySelector('.palette li.sel b')?.textContent.includes({word!r})"
+        took.append(looker.takes("keydown", answers, partial(looker.page.keyboard.press, word[-1])))
         looker.page.wait_for_timeout(PAUSE_MS)
-    looker.page.keyboard.press("Escape")
     return took
 
 
@@ -231,22 +240,13 @@ FAILED = """() => { window.measured = new Promise(done => {
 
 
 def fail(looker: Looker, times: int) -> list[float]:
-    """A node fails: the sentence is there."""
-    took = []
-    for _ in range(max(5, times // 4)):
-        looker.select("check")
-        looker.page.evaluate(FAILED)
-        looker.page.get_by_label("fails").click()
-        took.append(float(looker.page.evaluate("window.measured")))
-        looker.page.locator("#canvas").focus()
-        looker.page.keyboard.press("Control+z")
-        for toast in looker.page.locator(".toast").get_by_role("button", name="Close").all():
-            toast.click()
-        looker.page.wait_for_timeout(4 * PAUSE_MS)
-        looker.page.get_by_role("button", name="Start").click()
-        looker.page.get_by_role("button", name="Pause").wait_for()
-        looker.page.wait_for_timeout(4 * PAUSE_MS)
-    return took
+    """A node fails, and with it the run: the sentence is there. Once in a process."""
+    looker.select("check")
+    field = looker.page.get_by_label("fails")
+    field.fill("true")
+    looker.page.evaluate(FAILED)
+    field.press("Enter")
+    return [float(looker.page.evaluate("window.measured"))]
 
 
 # --- cases ---
@@ -373,6 +373,61 @@ def restart(times: int) -> dict[str, float]:
     return {"longest": max(took), "p50": percentile(took, 0.5)}
 
 
+async def _watched(seconds: int) -> dict[str, float]:
+    graph = build(None)
+    with TemporaryDirectory() as folder:
+        studio = Studio(Project(graph, Path(folder)))
+        await studio.steering.start(stay=True)
+        assert studio.steering.run is not None
+        sampler = studio.steering.run.sampler()  # statistics are on
+        server = Server(StudioDoor(asyncio.get_running_loop(), studio))
+        server.start()
+        fresh = multiprocessing.get_context("spawn")  # Playwright would take its time from this process
+        there, suspended, over = (fresh.Event() for _ in range(3))
+        page = fresh.Process(target=_look_on, args=(server.address, there, suspended, over))
+
+        async def hop() -> float:
+            done, began = sampler.done(), time.thread_time()
+            await asyncio.sleep(seconds)
+            return 1e6 * (time.thread_time() - began) / (sampler.done() - done)
+
+        await asyncio.sleep(1)  # until regions are fused
+        before = await hop()
+        page.start()
+        await asyncio.to_thread(there.wait)
+        watched, memory = await hop(), resident_mb(os.getpid())
+        suspended.set()
+        await asyncio.sleep(2)
+        asleep, grown = await hop(), resident_mb(os.getpid()) - memory
+        over.set()
+        await asyncio.to_thread(page.join)
+        await asyncio.sleep(1)
+        after = await hop()
+        await studio.close()
+        await server.stop()
+    alone = (before + after) / 2
+    return {"watched": watched / alone, "suspended": asleep / alone, "hop_us": alone, "grown_mb": grown}
+
+
+def _look_on(address: str, there: Event, suspended: Event, over: Event) -> None:
+    """Look at the page until it is suspended by a debugger."""
+    with browsers() as browser:
+        looker = Looker(browser, address)
+        looker.page.wait_for_timeout(3000)
+        there.set()
+        while not suspended.is_set():
+            looker.page.wait_for_timeout(100)
+        looker.cdp.send("Debugger.enable")
+        looker.cdp.send("Debugger.pause")
+        over.wait()
+        looker.cdp.send("Debugger.resume")
+
+
+def watched(seconds: int) -> dict[str, float]:
+    """Processor time of a firing at full speed: with one page beside none, and with the page suspended."""
+    return asyncio.run(_watched(seconds))
+
+
 CASES: dict[str, Case] = {}
 GOALS: list[Goal] = []
 SKIPPED: dict[str, str] = {}
@@ -388,12 +443,15 @@ for _name, (_, _budget) in MOMENTS.items():
 CASES["the page is ready"] = Case(ready, 4, "ms")
 CASES["frames"] = Case(frames, 6, "ms")
 CASES["left alone"] = Case(alone, 10, "%")
+CASES["watched / unwatched"] = Case(watched, 5, "x")
 CASES["killed and restarted"] = Case(restart, 3, "ms")
 _goal("the page is ready", "the page is ready", "first", 2000)
 _goal("pan and zoom: a frame", "frames", "ms", 1000 / 45)
 _goal("pan: the longest task", "frames", "longest_task_pan_ms", 50)
-_goal("left alone: the main thread", "left alone", "busy", 60)
+_goal("untouched: the main thread is busy", "left alone", "busy", 60)
 _goal("killed and restarted: live again", "killed and restarted", "longest", 1000)
+_goal("watched / unwatched, statistics on", "watched / unwatched", "watched", 1 / 0.93)
+_goal("suspended / unwatched, statistics on", "watched / unwatched", "suspended", 1 / 0.93)
 
 if not CHROMIUM:
     SKIPPED.update(dict.fromkeys(CASES, "there is no Chromium"))

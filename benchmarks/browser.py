@@ -15,6 +15,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.measure import ROOT
@@ -22,7 +23,7 @@ from benchmarks.measure import ROOT
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, CDPSession, Locator, Page
 
-__all__ = ["CHROMIUM", "Looker", "StudioProcess", "browsers", "percentile"]
+__all__ = ["CHROMIUM", "Looker", "StudioProcess", "browsers", "percentile", "resident_mb"]
 
 CHROMIUM = next(
     (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), ""
@@ -109,11 +110,6 @@ class StudioProcess:
             self._command += ["--port", port]
         self._begin()
         return time.time()
-
-    def memory_mb(self) -> float:
-        """Return what is resident."""
-        with open(f"/proc/{self.process.pid}/status") as status:  # noqa: PTH123 - no file of ours
-            return next(float(line.split()[1]) for line in status if line.startswith("VmRSS")) / 1024
 
     def close(self) -> None:
         """End it."""
@@ -226,6 +222,12 @@ class Looker:
 
     def close(self) -> None:
         self.context.close()
+
+
+def resident_mb(process: int) -> float:
+    """Return how much memory of a process is resident, on Linux."""
+    status = Path(f"/proc/{process}/status").read_text()
+    return float(status.partition("VmRSS:")[2].split()[0]) / 1024
 
 
 def percentile(values: list[float], share: float = 0.95) -> float:

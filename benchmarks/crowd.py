@@ -114,18 +114,18 @@ def check(value: int, *, fails: bool = False) -> None:
         raise ValueError(f"it failed at {time.time():.4f}")
 
 
-def build() -> hfg.Graph:
-    """Make the graph."""
+def build(rate_hz: float | None = RATE_HZ) -> hfg.Graph:
+    """Make the graph; None: all at full speed."""
     graph = hfg.Graph("crowd")
     for name in GROUPS:
         graph.group(name, threads=0)
     _mission(graph)
-    at_work = _for_moments(graph)
+    at_work = _for_moments(graph, rate_hz)
     groups = cycle(GROUPS)
     while left := NODES - len(graph.nodes):
         length = min(LENGTH, left, LIVE - at_work if at_work < LIVE else LENGTH)
         head = ticks() if at_work < LIVE else Wait()
-        _chain(graph, head, length, next(groups))
+        _chain(graph, head, length, next(groups), rate_hz)
         at_work += length
     return graph
 
@@ -141,9 +141,9 @@ def _mission(graph: hfg.Graph) -> None:
     think.done.activates(errand.begin)
 
 
-def _for_moments(graph: hfg.Graph) -> int:
+def _for_moments(graph: hfg.Graph, rate_hz: float | None) -> int:
     """What people do something with; gives how many nodes of it are at work."""
-    first = graph.add(ticks(), name="ticks", max_rate_hz=RATE_HZ)
+    first = graph.add(ticks(), name="ticks", max_rate_hz=rate_hz)
     graph.connect(first.out, graph.add(check(), name="check").value)
     drawn = graph.add(shade(), name="shade")
     graph.connect(first.out, drawn.value)
@@ -155,9 +155,9 @@ def _for_moments(graph: hfg.Graph) -> int:
     return 4
 
 
-def _chain(graph: hfg.Graph, head: Any, length: int, group: str) -> None:
+def _chain(graph: hfg.Graph, head: Any, length: int, group: str, rate_hz: float | None) -> None:
     """Nodes in a row; most take the sum of the two before them."""
-    options: dict[str, Any] = {} if isinstance(head, Wait) else {"max_rate_hz": RATE_HZ}
+    options: dict[str, Any] = {} if isinstance(head, Wait) else {"max_rate_hz": rate_hz}
     ports = [graph.add(head, group=group, **options).out]
     for number in range(1, length):
         is_sum = number in (2, 3, 5, 7, 9, 8 if group == GROUPS[0] else 9)

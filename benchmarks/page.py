@@ -14,7 +14,7 @@ import statistics
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from benchmarks import bench_goals, bench_links, bench_start
+from benchmarks import bench_goals, bench_links, bench_start, bench_studio
 from benchmarks.figures import Records, caption, cell, figure, measured_on
 from benchmarks.goals import Goal, judge
 from benchmarks.measure import ROOT, Record, read
@@ -156,6 +156,16 @@ def apart(records: Records) -> str:
     return f"{table(['', ''], rows)}\n\n{caption({record.case: record for record in (work, moves)})}"
 
 
+def budgets(records: Records) -> str:
+    """What the page of the studio takes, and what it may take."""
+    rows = []
+    for goal in bench_studio.GOALS:
+        if goal.ours.case in records:
+            verdict, unit = judge(goal, records), records[goal.ours.case].unit
+            rows.append([goal.name, f"{figure(verdict.ours)} {unit}", f"{figure(verdict.peer)} {unit}"])
+    return f"{table(['', 'measured', 'at most'], rows)}\n\n{caption(records)}"
+
+
 def seconds(records: Records) -> str:
     """Cases in seconds: a day of virtual time, graph files."""
     return f"{table(['', 's'], [[name, cell(record)] for name, record in records.items()])}\n\n{caption(records)}"
@@ -198,6 +208,7 @@ TABLES: dict[str, tuple[str, Callable[[Records], str]]] = {
     "links": ("bench_links", links),
     "leaky": ("bench_links", leaky),
     "linkgoals": ("bench_links", lambda records: goals(records, bench_links.GOALS)),
+    "studio": ("bench_studio", budgets),
     "apart": ("bench_links", apart),
 }
 """What may stand in `<!-- NAME -->`: the suite it needs, and who writes it."""
