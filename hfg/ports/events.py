@@ -38,7 +38,6 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
 
     def __init__(self, node: Owner, name: str, type: Any = None) -> None:  # noqa: A002
         Port.__init__(self, node, name, type)
-        # The runner of the node puts its own functions here.
         self._emit: Callable[[Any, int | None, float | None], None] = self._refuse
         self._emit_wait: Callable[[Any, int | None, float | None], Awaitable[None]] = self._refuse_wait
 
@@ -76,6 +75,35 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
             self._inner = inner_target(self)
         return self._inner
 
+    def _connect(
+        self,
+        emit: Callable[[Any, int | None, float | None], None],
+        emit_wait: Callable[[Any, int | None, float | None], Awaitable[None]],
+        trigger: Callable[..., None] | None = None,
+    ) -> None:
+        """Send signals with these functions from now on; for the runner.
+
+        Args:
+          emit: sends a signal.
+          emit_wait: sends a signal and waits for room.
+          trigger: replaces the method `trigger`, which would only call `emit`.
+        """
+        self._emit, self._emit_wait = emit, emit_wait
+        self.__dict__.pop("trigger", None)
+        if trigger is not None:
+            self.__dict__["trigger"] = trigger
+
+    def _notify_on_subscription(self, look: Callable[[], None]) -> None:
+        """Call this whenever the event gets an observer; for a fast path, which sends nothing to observers."""
+        self._look = look
+
+    def _disconnect(self) -> None:
+        """Refuse signals again, and complete the stream of every subscriber; for the runner."""
+        self._connect(self._refuse, self._refuse_wait)
+        self._look = None
+        self._belong_to(None, None)
+        self._complete()
+
     def _refuse(self, value: Any, activity: int | None, stamp: float | None) -> None:
         raise self._not_running("trigger")
 
@@ -108,7 +136,7 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
                 self._drop(observer)
 
     def _complete(self) -> None:
-        """Complete the stream of every subscriber; for the runner."""
+        """Complete the stream of every subscriber."""
         observers, self._observers = self._observers, None
         for observer in observers or ():
             try:

@@ -35,11 +35,14 @@ class RunObservable(Observable[T_co]):
     def _origin(self) -> RunObservable[Any]:
         return self
 
-    # The runner sets both on the event; they are None outside a run. `_thread` is the identity of the thread that makes
-    # the run's decisions.
+    # Both are None outside a run. `_thread` is the identity of the thread that makes the run's decisions.
     _scheduler: abc.SchedulerBase | None = None
     _thread: int | None = None
     path: Any
+
+    def _belong_to(self, scheduler: abc.SchedulerBase | None, thread: int | None) -> None:
+        """Be part of a run, or of none; for the runner."""
+        self._scheduler, self._thread = scheduler, thread
 
     def subscribe(
         self,

@@ -38,7 +38,6 @@ class OutputPort(Port, Source[T]):
 
     def __init__(self, node: Owner, name: str, type: Any) -> None:  # noqa: A002
         super().__init__(node, name, type)
-        # The runner of the node puts its own function here: (value, activity, stamp) -> None.
         self._emit: Callable[[Any, int | None, float | None], None] = self._refuse
         self._loaner: Loaner | None = None
 
@@ -91,6 +90,14 @@ class OutputPort(Port, Source[T]):
         except AttributeError:
             self._inner = inner_target(self)
             return self._inner
+
+    def _connect(self, emit: Callable[[Any, int | None, float | None], None]) -> None:
+        """Send values with this function from now on; for the runner."""
+        self._emit = emit
+
+    def _disconnect(self) -> None:
+        """Refuse values again; for the runner."""
+        self._emit = self._refuse
 
     def _refuse(self, value: Any, activity: int | None, stamp: float | None) -> None:
         raise self._not_running("send")

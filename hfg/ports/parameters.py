@@ -36,7 +36,11 @@ class ParameterPort(Port, Source[T], Target[T]):
     def __init__(self, node: Owner, name: str, spec: ParameterSpec) -> None:
         super().__init__(node, name, spec.type)
         self.spec = spec
-        self._tell: Callable[[Any], None] | None = None  # how a run reports that the node has set a read-only parameter
+        self._tell: Callable[[Any], None] | None = None  # reports to a run that the node has set a read-only parameter
+
+    def _report_to(self, report: Callable[[Any], None] | None) -> None:
+        """Call this whenever the node sets its read-only parameter; for the runner."""
+        self._tell = report
 
     @property
     def value(self) -> T:

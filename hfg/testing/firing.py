@@ -209,13 +209,12 @@ class _Firing:
         self.signals: list[Sent] = []
         self.ended = False
         for name in self.type.outputs:
-            node.ports.outputs[name]._emit = self._writer(name)
+            node.ports.outputs[name]._connect(self._writer(name))
         automatic = (name for name in AUTOMATIC_EVENTS if name != "completed" or "do" in self.type.hooks)
         for name in (*self.type.events, *automatic):
             port = node.ports.events[name] if not self.type.is_subgraph else None
             if port is not None:
-                port._emit = self._trigger(name)
-                port._emit_wait = self._wait(name)
+                port._connect(self._trigger(name), self._wait(name))
 
     def of_process(self, values: dict[str, Any]) -> Firing:
         if self.type.process_kind == "none":

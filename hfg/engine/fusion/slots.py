@@ -256,7 +256,7 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
         nonlocal watched
         watched = port._observers is not None
 
-    port._look = look
+    port._notify_on_subscription(look)
     return emit
 
 

@@ -460,8 +460,7 @@ class Engine:
 
     def adopt_event(self, port: EventPort[Any]) -> None:
         """Attach the run's scheduler and thread to an event (P9)."""
-        port._scheduler = self.scheduler
-        port._thread = self._thread
+        port._belong_to(self.scheduler, self._thread)
 
     # --- the end ----------------------------------------------------------------------------------------------------
 

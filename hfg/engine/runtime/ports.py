@@ -37,12 +37,12 @@ def bind(worker: RunningNode) -> None:
     for position, name in enumerate(node_type.outputs):
         beyond_one = worker.concurrent is not None
         emit = partial(concurrency.write, worker, position) if beyond_one else firing.writer(worker, position)
-        ports.outputs[name]._emit = emit if worker.tasks is None else task_ports.refusing(worker, position, emit)
+        ports.outputs[name]._connect(emit if worker.tasks is None else task_ports.refusing(worker, position, emit))
     for name in node_type.events:
         bind_event(worker, name)
     for name, spec in node_type.parameters.items():
         if spec.read_only:
-            ports.parameters[name]._tell = partial(_show, worker, name)
+            ports.parameters[name]._report_to(partial(_show, worker, name))
 
 
 def _show(worker: RunningNode, name: str, value: Any) -> None:
@@ -68,8 +68,9 @@ def _trace_set(worker: RunningNode, name: str, value: Any) -> None:
 
 def bind_event(worker: RunningNode, name: str) -> RunningEvent:
     """Make the running event of a declared or automatic event, and let its port trigger it."""
+    automatic = is_automatic_event(name)
+    relayed = worker.scope is not None and not automatic
     event = worker.events.get(name)
-    relayed = worker.scope is not None and not is_automatic_event(name)
     if event is None:
         event = worker.make_event(name, None)
         if relayed:
@@ -79,39 +80,41 @@ def bind_event(worker: RunningNode, name: str) -> RunningEvent:
         return event
     port = worker.node.ports.events[name]
     event.bind(port)
-    host = worker.core.runtime
-    if relayed:
-        host.adopt_event(port)
-        return event
-    port.__dict__.pop("trigger", None)  # the fast path, if it had one where it ran before (R4)
-    if worker.group.threaded:
-        port._emit = partial(_from_thread, worker, event)
-    elif worker.core.debug or any(one is not None for one in (worker.concurrent, worker.attempts, worker.tasks)):
-        emit = slots.emitter(event, plainly=True)
-        port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
-    else:
-        emit = slots.emitter(event)
-        port.trigger = emit  # instead of the method, which would only call it
-        port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
-    port._emit_wait = partial(worker.core.code.trigger_wait, event)
-    if worker.concurrent is not None or worker.attempts is not None:
-        port._emit = concurrency.triggering(worker, port._emit)
-        port._emit_wait = concurrency.triggering(worker, port._emit_wait)
-    if worker.tasks is not None:
-        port._emit = task_ports.triggering(event, port._emit)
-    if worker.core.debug:
-        port._emit, port._emit_wait = _checked(worker, port, port._emit), _checked(worker, port, port._emit_wait)
-    if worker.lifecycle.early is not None:
-        port.__dict__.pop("trigger", None)
-        port._emit = partial(_keep, event)
-    host.adopt_event(port)
-    if is_automatic_event(name) and worker.scope is not None:
+    if not relayed:
+        _connect(event, port)
+    worker.core.runtime.adopt_event(port)
+    if automatic and worker.scope is not None:
         plan.watch_scope(worker.scope)
-    if is_automatic_event(name) and worker.core.started:
+    if automatic and worker.core.started:
         worker.watch()
         worker.changed()
         bind(worker)  # what it triggers may have consequences from now on
     return event
+
+
+def _connect(event: RunningEvent, port: EventPort[Any]) -> None:
+    """Let a port trigger its event directly if possible, otherwise through a layer for each check that applies."""
+    worker = event.worker
+    debug = worker.core.debug
+    overlapping = worker.concurrent is not None or worker.attempts is not None
+    shortcut: Callable[..., None] | None = None
+    wait: Callable[..., Any] = partial(worker.core.code.trigger_wait, event)
+    if worker.group.threaded:
+        emit: Callable[..., Any] = partial(_from_thread, worker, event)
+    else:
+        plainly = debug or overlapping or worker.tasks is not None
+        short = slots.emitter(event, plainly=plainly)
+        shortcut = None if plainly else short
+        emit = lambda value, activity, stamp: short(value, activity=activity, stamp=stamp)  # noqa: E731
+    if overlapping:
+        emit, wait = concurrency.triggering(worker, emit), concurrency.triggering(worker, wait)
+    if worker.tasks is not None:
+        emit = task_ports.triggering(event, emit)
+    if debug:
+        emit, wait = _checked(worker, port, emit), _checked(worker, port, wait)
+    if worker.lifecycle.early is not None:
+        emit, shortcut = partial(_keep, event), None
+    port._connect(emit, wait, shortcut)
 
 
 def _keep(event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
@@ -185,15 +188,10 @@ def release_ports(worker: RunningNode) -> None:
     for event in worker.events.values():
         port = event.port
         if port is not None:
-            port.__dict__.pop("trigger", None)
-            port._emit = port._refuse
-            port._emit_wait = port._refuse_wait
-            port._scheduler = port._thread = port._look = None
-            port._complete()
+            port._disconnect()
     if node is not None and not worker.silent_code:
         for name, spec in worker.type.parameters.items():
             if spec.read_only:
-                node.ports.parameters[name]._tell = None
+                node.ports.parameters[name]._report_to(None)
         for name in worker.type.outputs:
-            port = node.ports.outputs[name]
-            port._emit = port._refuse
+            node.ports.outputs[name]._disconnect()

@@ -51,14 +51,13 @@ class RunningCode(Sending):
         """Let the ports of a node speak to this machine."""
         station.node._start_task = partial(self.start_task, station)
         for name in station.type.outputs:
-            station.node.ports.outputs[name]._emit = self._writer(station, name)
+            station.node.ports.outputs[name]._connect(self._writer(station, name))
         for name in station.type.events:
             port = station.node.ports.events[name]
-            port._emit = self._trigger_of(station, name)
-            port._emit_wait = self._waiting_trigger_of(station, name)
+            port._connect(self._trigger_of(station, name), self._waiting_trigger_of(station, name))
         for name, spec in station.type.parameters.items():
             if spec.read_only:
-                station.node.ports.parameters[name]._tell = partial(self._show, station, name)
+                station.node.ports.parameters[name]._report_to(partial(self._show, station, name))
 
     def _show(self, station: Station, name: str, value: Any) -> None:
         """The node has set a read-only parameter (P8, R7)."""
