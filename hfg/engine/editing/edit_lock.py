@@ -11,8 +11,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
 
-from hfg.engine.executing.code import whose_code
-from hfg.engine.model.current import current_firing, current_task
+from hfg.engine.model.current import current_firing, current_task, whose_code
 from hfg.engine.model.running_node import RunningNode
 from hfg.errors import UsageError
 

@@ -267,11 +267,11 @@ class Edits:
         new, nodes = apply(engine.core, self._index, self._graph, how, edit.come, engine.groups)
         for edge, flat in new:
             if flat.source.kind == "observable":
-                self._lifecycle.feed(flat.source.port, edge, flat.options.through)
+                self._lifecycle.streams.feed(flat.source.port, edge, flat.options.through)
             elif flat.options.through:
-                self._lifecycle.pipe(edge, flat.options.through)
+                self._lifecycle.streams.pipe(edge, flat.options.through)
         for edge in how.lost:
-            self._lifecycle.forget(edge)
+            self._lifecycle.streams.forget(edge)
         self._tell_parameters(edit.changes)
         for worker in (*edit.come, *(worker for worker, _, _ in how.swapped)):
             node_lifecycle.take_part(worker)

@@ -13,7 +13,8 @@ from functools import partial
 from typing import Any
 
 from hfg.engine.editing.edit_lock import EditLock
-from hfg.engine.executing.code import answer, whose_code
+from hfg.engine.executing.code import answer
+from hfg.engine.model.current import whose_code
 from hfg.engine.model.running_node import ENDED, UNREADY, RunningNode
 from hfg.engine.rules import concurrency, doing, node_lifecycle
 from hfg.engine.runtime import plan
@@ -147,7 +148,7 @@ class NodeHooks:
             except HfgError as error:
                 engine.core.errors.append(error)
             _drop_code(worker)
-            self._lifecycle.forget(worker)
+            self._lifecycle.went(worker)
 
 
 def _drop_code(worker: RunningNode) -> None:

@@ -8,9 +8,9 @@ from __future__ import annotations
 import inspect
 
 from hfg.base.logs import Log, Logger
-from hfg.engine.executing.code import whose_code
 from hfg.engine.executing.groups import current_job
 from hfg.engine.model import Core, RunningNode
+from hfg.engine.model.current import whose_code
 
 __all__ = ["log_of_running_code", "speaker"]
 

@@ -15,33 +15,21 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 from types import CoroutineType
-from typing import Any, Protocol
+from typing import Any
 
 from hfg.engine.executing.eager_task import EagerTask
+from hfg.engine.executing.pump import Pump
 from hfg.engine.executing.virtual import VirtualTimeLoop
-from hfg.engine.model import ConcurrentFiring, Core, Job, RunningEvent, RunningNode, records
+from hfg.engine.model import ConcurrentFiring, Core, Job, RunningNode, jobs
 from hfg.engine.model.contracts import EagerTask as AnyEagerTask
 from hfg.engine.model.core import PENDING
-from hfg.engine.model.current import current_firing, current_task
-from hfg.engine.model.records import Done
+from hfg.engine.model.current import current_firing, run_as
+from hfg.engine.model.jobs import Done
 from hfg.engine.rules import concurrency, errors
-from hfg.engine.rules.sending import trigger, trigger_from_task
 
-__all__ = ["CodeRunner", "Pump", "answer", "run_as", "whose_code"]
-
-_code_of: contextvars.ContextVar[RunningNode | None] = contextvars.ContextVar("hfg.code_of", default=None)
+__all__ = ["CodeRunner", "answer"]
 
 _Outcome = tuple[Any, Exception | None]
-
-
-def whose_code() -> RunningNode | None:
-    """Return the async node whose code, or a task of which, is the caller."""
-    return _code_of.get()
-
-
-def run_as(worker: RunningNode) -> None:
-    """From now on, in this context, the code of this async node runs."""
-    _code_of.set(worker)
 
 
 def answer(waiter: asyncio.Future[Any], value: Any) -> None:
@@ -50,43 +38,12 @@ def answer(waiter: asyncio.Future[Any], value: Any) -> None:
         waiter.set_result(value)
 
 
-def _nobody_waits(_how_many: int) -> None:
-    """The code that waits for room is not the node's own."""
-
-
 def _limit_of(worker: RunningNode, firing: ConcurrentFiring | None) -> tuple[float | None, Callable[[], None]]:
     """Return the time limit of a firing, if it has one, and what happens after it (X2)."""
     if firing is not None:
         return firing.limit_s, partial(concurrency.time_out, firing)
     limited = worker.options is not None and worker.busy == "firing"
     return worker.options.max_duration_s if limited else None, partial(errors.time_out, worker)
-
-
-class Pump(Protocol):
-    """What needs to know that code is back: the engine."""
-
-    beside_work: int
-
-    def guard(self, call: Callable[[], None]) -> None:
-        """Make a call of the engine's own; an error ends the run."""
-
-    def go_on(self) -> None:
-        """A callback of the loop is over: pump."""
-
-    def give_way(self, call: Callable[[], None]) -> None:
-        """Make this call after all that is ready now."""
-
-    def soon(self, callback: Callable[[], None]) -> None:
-        """Call back in the loop's next pass."""
-
-    def on_loop(self) -> bool:
-        """Return whether the caller is on the run's own thread."""
-
-    def internal_fault(self, error: BaseException) -> None:
-        """End the run because of a fault in the engine."""
-
-    def kick(self) -> None:
-        """Something may be queued: make the pump run."""
 
 
 class CodeRunner:
@@ -295,7 +252,7 @@ class CodeRunner:
                 firing.rest()
             self._report(done, job.result, job.error, closing=closing)
 
-        job: Job = records.Job(worker, back, call if firing is None else of_firing, arguments, done)
+        job: Job = jobs.Job(worker, back, call if firing is None else of_firing, arguments, done)
         if firing is None:
             worker.begin_async()
             worker.execution.take_job(job)
@@ -399,70 +356,6 @@ class CodeRunner:
         self.aside.clear()
         return left
 
-    async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
-        """Trigger, then wait until no `wait` queue that the node's events fill is full (F8).
-
-        Before the start tasks wait too, but not `setup()`, because the start waits for it. After the end of the run,
-        code that sends in an endless loop yields here each time; otherwise it would block the loop, uncancellable.
-        """
-        worker = event.worker
-        core = worker.core
-        if worker.lifecycle.early is not None:
-            await self._early(event, value, activity, stamp)
-            return
-        task = current_task.get()
-        own: Any = worker.room.wait if whose_code() is worker else _nobody_waits  # its own waits for us
-        if task is not None and task.worker is worker:
-            trigger_from_task(event, value, activity, stamp)
-            own = worker.need_tasks().wait_for_room
-        else:
-            trigger(event, value, activity, stamp)
-        while worker.room.full_edges and (core.started or task is not None) and not core.over:
-            await self._room(worker, own)
-        if core.over:
-            await asyncio.sleep(0)
-
-    async def _early(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
-        """Wait until a node that is set up ahead takes part; otherwise an endless loop would block this one (R4).
-
-        `setup()` does not wait, because the node takes part after it.
-        """
-        lifecycle = event.worker.lifecycle
-        assert event.port is not None
-        event.port._emit(value, activity, stamp)
-        if not lifecycle.opening:
-            waiter: asyncio.Future[None] = self.loop.create_future()
-            lifecycle.when_taking_part(lambda: answer(waiter, None))
-            await waiter
-
-    async def _room(self, worker: RunningNode, own: Callable[[int], None]) -> None:
-        """Wait until all queues of a node's events have room; `own` counts how much of its code waits."""
-        waiter: asyncio.Future[None] = self.loop.create_future()
-        waits = True
-
-        def over() -> None:
-            """The graph is not quiet from now on, though the code continues only in the loop's next pass (F13)."""
-            nonlocal waits
-            if waits:
-                waits = False
-                own(-1)
-            answer(waiter, None)
-
-        worker.room.when_free(over)
-        own(1)
-        self._look_for_room()
-        worker.core.runtime.kick()
-        try:
-            await waiter
-        finally:
-            over()
-            self._look_for_room()
-
-    def _look_for_room(self) -> None:
-        """An edit that waits for this code must not hold nodes that could make room."""
-        if self.core.quiescing is not None:
-            self.core.quiescing.look_for_room()
-
     # --- from threads -----------------------------------------------------------------------------------------------
 
     def deliver(self, box: deque[Any]) -> None:
@@ -477,7 +370,7 @@ class CodeRunner:
             return  # nothing has come in: the pump must not run because of it, or its turns were a matter of luck
         while box:
             item = box.popleft()
-            if isinstance(item, records.Job):
+            if isinstance(item, jobs.Job):
                 self._engine.guard(partial(item.owner, item))
             elif not self.core.over:
                 self._engine.guard(item)
@@ -485,7 +378,7 @@ class CodeRunner:
 
     def _hold_back(self, box: deque[Any], item: Any) -> None:
         """In virtual time the clock decides when a job arrives, with the signals before it (R6)."""
-        if not isinstance(item, records.Job):
+        if not isinstance(item, jobs.Job):
             self._early_signals.setdefault(id(box), []).append(item)
             return
         signals = self._early_signals.pop(id(box), [])

@@ -17,7 +17,7 @@ from functools import partial
 from typing import Any
 
 from hfg.engine.model.core import PENDING
-from hfg.engine.model.records import Done
+from hfg.engine.model.jobs import Done
 
 __all__ = ["EagerTask"]
 

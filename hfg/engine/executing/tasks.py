@@ -13,11 +13,12 @@ from typing import Any
 
 from hfg.base.clock import current_clock, current_elapsed
 from hfg.base.logs import current_log, node_log
-from hfg.engine.executing.code import CodeRunner, Pump, run_as
+from hfg.engine.executing.code import CodeRunner
 from hfg.engine.executing.eager_task import EagerTask
+from hfg.engine.executing.pump import Pump
 from hfg.engine.model import Core, Doing, Task
 from hfg.engine.model.core import PENDING
-from hfg.engine.model.current import current_firing, current_task
+from hfg.engine.model.current import current_firing, current_task, run_as
 from hfg.engine.model.running_node import DISABLED, ENDED, TORN_DOWN, RunningNode
 from hfg.engine.rules import doing as do_activity
 from hfg.engine.rules import errors

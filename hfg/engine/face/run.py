@@ -17,6 +17,7 @@ from hfg.base.token import Token
 from hfg.engine.editing.breakpoints import Breakpoint, Step
 from hfg.engine.editing.setting import set_parameter
 from hfg.engine.executing.code import answer
+from hfg.engine.executing.room import trigger_wait
 from hfg.engine.face import outside
 from hfg.engine.face.composition import Composition
 from hfg.engine.fusion.explaining import Explanation, explain
@@ -115,7 +116,7 @@ class Run:
             await outside.signal(self._engine, worker, port.name, value, activity, stamp)
             return
         event = bind_event(worker, port.name)
-        await self._engine.code.trigger_wait(event, value, activity, self._engine.now() if stamp is None else stamp)
+        await trigger_wait(event, value, activity, self._engine.now() if stamp is None else stamp)
 
     async def _trigger_inside(self, port: Port, value: object, activity: int | None, stamp: float | None) -> None:
         """The slot of a subgraph stands for those inside that it leads to (G1)."""

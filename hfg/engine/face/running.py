@@ -14,48 +14,36 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, NoReturn, Unpack
 
 from hfg.base.hooks import hooks
-from hfg.base.logs import Log
 from hfg.engine.executing.punctual import PunctualLoop
 from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.face import outside
 from hfg.engine.face.composition import Composition
+from hfg.engine.face.preconditions import (
+    need_begin,
+    need_clock,
+    need_no_loop,
+    need_no_problem,
+    need_no_real_clock,
+    need_use_of_seed,
+    no_graph,
+    refuse_endless,
+)
 from hfg.engine.face.run import Run
 from hfg.engine.face.watching import watched
 from hfg.engine.observing.report import Report
 from hfg.engine.runtime.interrupt import CtrlC
 from hfg.engine.runtime.settings import RunFields, RunGiven, Settings
-from hfg.errors import CheckFailed, GraphError, HfgError, RunError, UsageError
+from hfg.errors import HfgError, RunError, UsageError
 from hfg.graph import Graph
-from hfg.graph.checks import check_flat
-from hfg.graph.checks.endless import endless
-from hfg.graph.flat import FlatGraph, flatten
+from hfg.graph.flat import flatten
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
 from hfg.graph.structure.option import declared, explaining
 
 __all__ = ["run", "run_async", "running"]
 
-_GRAPH = Log("hfg.graph")
 
 Clock = Literal["real", "virtual"]
-
-
-def _need_clock(clock: str) -> None:
-    if clock not in ("real", "virtual"):
-        raise UsageError(f'clock must be "real" or "virtual", got {clock!r}')
-
-
-def _need_no_loop() -> None:
-    try:
-        asyncio.get_running_loop()
-    except RuntimeError:
-        return
-    raise UsageError("hfg.run blocks, and an event loop is running here: write `report = await hfg.run_async(graph)`")
-
-
-def _no_graph(found: object) -> UsageError:
-    how = f"hfg.run({found.__name__}())" if inspect.isfunction(found) else "hfg.run(graph)"
-    return UsageError(f"a Graph can run, not {type(found).__name__}: write {how}")
 
 
 def _settings(options: RunGiven, *, allow_idle: bool = False) -> Settings:
@@ -67,8 +55,8 @@ def _settings(options: RunGiven, *, allow_idle: bool = False) -> Settings:
 def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Composition]:
     """Check the graph and make its running form; nothing has happened yet."""
     if not isinstance(graph, Graph):
-        raise _no_graph(graph)
-    _need_clock(clock)
+        raise no_graph(graph)
+    need_clock(clock)
     level = level_of(graph)
     if level.owner is not None:
         raise UsageError(f'{level.title} runs as a part of the whole: run graph "{level.whole.root.name}"')
@@ -76,7 +64,7 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
         raise UsageError(f'graph "{graph.name}" runs already: a graph has one run at a time; build a second graph')
     is_virtual = isinstance(asyncio.get_running_loop(), VirtualTimeLoop)
     if is_virtual:
-        _need_no_real_clock(settings)
+        need_no_real_clock(settings)
         settings.watch = False
     elif clock == "virtual":
         raise UsageError(
@@ -84,10 +72,10 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
             "asyncio.Runner(loop_factory=hfg.VirtualTimeLoop).run(main()) around the whole program"
         )
     flat = flatten(graph)
-    _need_use_of_seed(flat, settings)
-    _need_no_problem(flat)
+    need_use_of_seed(flat, settings)
+    need_no_problem(flat)
     if settings.until_s is not None and is_virtual:
-        _refuse_endless(flat)
+        refuse_endless(flat)
     others = None
     if settings.settings is not None or any(group.process for group in flat.groups.values()):
         others = hooks.distribute(graph, flat, settings.everywhere(), is_virtual, settings.settings)
@@ -97,74 +85,10 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
     return run, parts
 
 
-def _need_no_real_clock(settings: Settings) -> None:
-    """In virtual time, what looks at the real clock would be without effect."""
-    if settings.watch_said and settings.watch:
-        raise UsageError(
-            "watch= needs the real clock: in virtual time a run is over before anybody looks; leave watch= out, or "
-            'write clock="real"'
-        )
-    if settings.settings is not None:
-        raise UsageError(
-            "settings= needs the real clock: in virtual time all parts of a graph share one loop; leave settings= "
-            'out, or write clock="real"'
-        )
-
-
-def _need_no_problem(flat: FlatGraph) -> None:
-    """Refuse a graph with errors; what else the checks found is logged."""
-    problems = check_flat(flat)
-    if any(problem.severity == "error" for problem in problems):
-        raise CheckFailed(problems)
-    for problem in problems:
-        if problem.severity == "warning":
-            _GRAPH.warning('"%s": %s: %s; %s', problem.path, problem.what, problem.why, problem.remedy)
-
-
-def _need_use_of_seed(flat: FlatGraph, settings: Settings) -> None:
-    """A seed by which nothing is drawn, no policy and no pause before a retry, would be without effect."""
-    policies = [settings.policy] if settings.policy else [group.policy for group in flat.groups.values()]
-    if settings.seed is None or "random" in policies:
-        return
-    if not any(node.options.retry_jitter for one in flat.walk() for node in one.nodes):
-        raise UsageError(
-            f'seed={settings.seed} has no effect, for no group of graph "{flat.level.name}" has the policy "random": '
-            f'write policy="random", seed={settings.seed}, or leave it out'
-        )
-
-
-def _need_begin(begin: object) -> None:
-    if begin is None:
-        return
-    if not callable(begin) or inspect.iscoroutinefunction(begin):
-        raise UsageError(
-            f"begin= is a plain function that takes the run, as in begin=lambda run: ..., got {begin!r:.80}; for what "
-            "waits, write `async with hfg.running(graph) as run:`"
-        )
-    try:
-        inspect.signature(begin).bind(None)
-    except TypeError as error:
-        raise UsageError(f"begin= takes the run, as in begin=lambda run: ..., and this one does not: {error}") from None
-    except ValueError:
-        pass  # a builtin that does not tell
-
-
-def _refuse_endless(flat: FlatGraph) -> None:
-    """R6: under a virtual clock a source that never ends and waits for nothing would hold time still forever.
-
-    Only where that is certain; else the engine notices that time has stood still for millions of firings.
-    """
-    for node in endless(flat, virtual=True):
-        raise GraphError(
-            f'source "{node.path}" has no rate, waits for nothing and never ends, so virtual time would stand still '
-            "for ever: give it max_rate_hz=, or let it raise hfg.EndOfStream"
-        )
-
-
 async def _run_to_end(
     graph: Graph, clock: Clock, settings: Settings, begin: Callable[[Run], object] | None, ctrl_c: CtrlC | None = None
 ) -> Report:
-    _need_begin(begin)
+    need_begin(begin)
     run, parts = _prepare(graph, clock, settings)
     engine, run_lifecycle = parts.engine, parts.run_lifecycle
     if ctrl_c is not None:
@@ -179,7 +103,7 @@ async def _run_to_end(
                     answer = begin(run)
                     if inspect.iscoroutine(answer):
                         answer.close()
-                        _need_begin(answer)
+                        need_begin(answer)
                 if settings.allow_idle:
                     engine.quiet.hold()
                 await parts.start()
@@ -251,9 +175,9 @@ def run(
       RunError: a node failed (`NodeError`), the graph stalled (`Stalled`), or it aborted itself (`Aborted`).
       UsageError: called inside a running event loop, or the graph is already running.
     """
-    _need_no_loop()
+    need_no_loop()
     settings = _settings(options, allow_idle=allow_idle)
-    _need_clock(clock)
+    need_clock(clock)
     return _run_blocking(graph, clock, settings, begin)
 
 

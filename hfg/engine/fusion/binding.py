@@ -18,10 +18,10 @@ from hfg.base.token import NO_MESSAGE, Token
 from hfg.engine.fusion.schedule import Schedule, is_only_called
 from hfg.engine.fusion.tap_writing import Passed, TapWriter
 from hfg.engine.model import Core, RunningNode
-from hfg.engine.model.core import Flags
+from hfg.engine.model.flags import Flags
 from hfg.engine.rules.firing import newest_stamp, take
+from hfg.engine.rules.putting import put
 from hfg.engine.rules.releasing import make_room, release
-from hfg.engine.rules.sending import put
 from hfg.ports.edges import BufferEdge, EventEdge
 
 __all__ = ["TOOLS", "Fusible", "Text", "Wave", "bind"]

@@ -19,8 +19,9 @@ from hfg.engine.rules import errors, firing
 from hfg.engine.rules.agenda import add_call, freed, idle_again, note_full
 from hfg.engine.rules.calls import await_call
 from hfg.engine.rules.modifiers import derive_scopes, tell_activity
+from hfg.engine.rules.putting import bring_activity
 from hfg.engine.rules.releasing import release
-from hfg.engine.rules.sending import bring_activity, trigger
+from hfg.engine.rules.sending import trigger
 from hfg.ports.edges import AnyEdge, EventEdge, SyncEdge
 
 __all__ = ["calls_step", "emitter"]
@@ -211,28 +212,19 @@ def _interpreted_emitter(event: RunningEvent) -> Callable[..., None]:
 
 def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..., None]) -> Callable[..., None]:
     worker, port = event.worker, event.port
-    core = worker.core
-    host = core.runtime
+    core, host = worker.core, worker.core.runtime
     watched = port._observers is not None
     target: RunningNode = edge.target
-    queue = edge.queue
-    carries = edge.active
+    queue, carries = edge.queue, edge.active
 
     # (keyword-only parameters would cost 20 ns; the type checker refuses positional ones)
     def emit(value: object = None, activity: int | None = None, stamp: float | None = None) -> None:
-        if (
-            activity is not None
-            or core.running_node is not worker  # not from a fast path; perhaps from a thread while the loop runs
-            or watched
-            or not edge.live
-            or type(value) is Token
-        ):
+        # another node runs if this does not come from a fast path, but perhaps from a thread while the loop runs
+        if activity is not None or core.running_node is not worker or watched or not edge.live or type(value) is Token:
             interpreted(value, activity=activity, stamp=stamp)
             return
-        if stamp is None:
-            stamp = worker.stamp
-            if stamp is None:
-                stamp = core.now()
+        if stamp is None and (stamp := worker.stamp) is None:
+            stamp = core.now()
         edge.sent = number = edge.sent + 1
         if carries and (worker.active or worker.may_carry):
             queue.append((value, 1, stamp, number))

@@ -26,12 +26,12 @@ from hfg.engine.fusion.binding import Fusible, Wave, bind
 from hfg.engine.fusion.region import Region
 from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.fusion.writing import Writer
-from hfg.engine.model.core import Flags
+from hfg.engine.model.flags import Flags
 from hfg.engine.model.running_node import RunningNode
 from hfg.engine.rules import firing
 from hfg.engine.rules.agenda import consider, idle_again, queue_next_in_wave
+from hfg.engine.rules.putting import put
 from hfg.engine.rules.releasing import make_room, release
-from hfg.engine.rules.sending import put
 from hfg.ports.edges import ACTIVITY, SyncEdge
 
 __all__ = ["SOONER_IN_THREADS", "ThreadRegion"]

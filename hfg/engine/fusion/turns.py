@@ -26,7 +26,8 @@ from hfg.engine.fusion.wave_state import WaveState
 from hfg.engine.model.running_node import NO_CALLS, RunningNode
 from hfg.engine.model.tap import tap_inside
 from hfg.engine.rules.firing import receive_modifiers
-from hfg.engine.rules.sending import activity_left, announce, bring_activity, put, send_automatic, sent
+from hfg.engine.rules.putting import bring_activity, put
+from hfg.engine.rules.sending import activity_left, announce, send_automatic, sent
 
 __all__ = ["Turns"]
 

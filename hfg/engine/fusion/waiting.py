@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import inf
-from typing import Any
+from typing import Any, cast
 
 from hfg.engine.model.core import PENDING
 from hfg.engine.model.running_node import RunningNode
@@ -24,27 +24,13 @@ Step = Callable[[RunningNode], None]
 def waiting_step(worker: RunningNode) -> Step:
     """The step of an async function whose inputs are all fed by outputs; else the interpreted one."""
     edges = worker.live_inputs
-    kind = worker.type
-    if kind.result == "fields" or worker.listeners or not all(type(edge) is SyncEdge for edge in edges):
+    if worker.type.result == "fields" or worker.listeners or not all(type(edge) is SyncEdge for edge in edges):
         return firing.step
-    core = worker.core
-    code = core.code
-    process: Any = worker.process
-    inputs = worker.inputs
-    count = len(edges)
-    unset = worker.unset
+    inputs, unset, count = worker.inputs, worker.unset, len(edges)
     held, pipelined = worker.shape.sequential, worker.shape.pipelined
-    lent: Any = None  # the eager task for which `late` was made
-    late: Any = None
-
-    def leave(result: object, error: BaseException | None) -> None:
-        if error is None:
-            firing.complete_firing(worker, result)
-        else:
-            firing.when_done(worker)(result, error)
+    call = _waiting_call(worker)
 
     def step(worker: RunningNode) -> None:
-        nonlocal lent, late
         if worker.special or not worker.fireable or inputs.missing or worker.busy:
             firing.step(worker)
             return
@@ -64,9 +50,28 @@ def waiting_step(worker: RunningNode) -> Step:
         worker.fire_plainly(held, stamp)
         if pipelined:
             release(pipelined)
+        call(arguments)
+
+    return step
+
+
+def _waiting_call(worker: RunningNode) -> Callable[[list[Any]], None]:
+    """Return what starts the function in the node's eager task, and lets the firing end when its value is there."""
+    core, process = worker.core, cast("Callable[..., Any]", worker.process)
+    current: Any = None  # the eager task for which `late` was made
+    late: Any = None
+
+    def leave(result: object, error: BaseException | None) -> None:
+        if error is None:
+            firing.complete_firing(worker, result)
+        else:
+            firing.when_done(worker)(result, error)
+
+    def call(arguments: list[Any]) -> None:
+        nonlocal current, late
         eager_task: Any = worker.execution.eager_task
-        if eager_task is not lent:
-            lent, late = eager_task, code.late(worker, leave)
+        if eager_task is not current:
+            current, late = eager_task, core.code.late(worker, leave)
         core.running_node = worker
         try:
             result = eager_task.start(process(*arguments), late)
@@ -78,4 +83,4 @@ def waiting_step(worker: RunningNode) -> Step:
         else:
             leave(result, None)
 
-    return step
+    return call

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hfg.engine.fusion.schedule import Key, Schedule, Turn, is_only_called, takes_no_turns
-from hfg.engine.model.core import Flags
+from hfg.engine.model.flags import Flags
 from hfg.engine.model.running_node import NO_CALLS, RunningNode
 from hfg.engine.rules import agenda
 from hfg.errors import EngineInternalError

@@ -14,7 +14,7 @@ it. The names here have it filled in, for all other packages.
 
 from typing import TypeAlias
 
-from hfg.engine.model import concurrent, core, events, groups, iteration, records, scopes, tasks
+from hfg.engine.model import concurrent, core, events, groups, iteration, jobs, scopes, tasks
 from hfg.engine.model.running_node import RunningNode
 
 __all__ = [
@@ -42,7 +42,7 @@ Gate: TypeAlias = scopes.Gate[RunningNode]
 Group: TypeAlias = groups.Group[RunningNode]
 Runtime: TypeAlias = core.Runtime[RunningNode]
 Iteration: TypeAlias = iteration.Iteration[RunningNode]
-Job: TypeAlias = records.Job[RunningNode]
+Job: TypeAlias = jobs.Job[RunningNode]
 RunningEvent: TypeAlias = events.RunningEvent[RunningNode]
 Scope: TypeAlias = scopes.Scope[RunningNode]
 Task: TypeAlias = tasks.Task[RunningNode]

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, Literal, TypeAlias
 
 from hfg.engine.model.contracts import EagerTask, NodeT, Timer
-from hfg.engine.model.records import Job, Record
+from hfg.engine.model.jobs import Job
+from hfg.engine.model.records import Record
 from hfg.errors import NodeError
 from hfg.trace import FiringOutcome
 

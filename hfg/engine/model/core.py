@@ -11,16 +11,14 @@ from collections import deque
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import dataclass, field
 from types import FrameType
-from typing import Any, Final, Generic, Literal, Protocol
-
-from typing_extensions import override
+from typing import Any, Generic, Literal, Protocol
 
 from hfg.base.token import Token
 from hfg.engine.model.concurrent import ConcurrentFiring
 from hfg.engine.model.contracts import NodeT, Timer
-from hfg.engine.model.events import RunningEvent
+from hfg.engine.model.flags import Flags
 from hfg.engine.model.iteration import Iteration
-from hfg.engine.model.records import Done
+from hfg.engine.model.jobs import Done
 from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.tasks import Doing, Task
 from hfg.errors import HfgError
@@ -28,7 +26,7 @@ from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.ports.events import EventPort
 from hfg.trace import TraceEvent
 
-__all__ = ["PENDING", "Code", "Core", "Flags", "FusedRegion", "RuleCallbacks", "Runtime"]
+__all__ = ["PENDING", "Code", "Core", "FusedRegion", "RuleCallbacks", "Runtime"]
 
 
 class _Pending:
@@ -38,41 +36,6 @@ class _Pending:
 
 PENDING = _Pending()
 """The result of code that waits: the real one comes later."""
-
-_FOR_A_WAVE: Final = frozenset({"disturbed", "dissolved", "sends"})
-"""Flags that only end the wave in progress."""
-
-
-class Flags(list[str]):
-    """Why the pump, or a wave, must look at other things. The pump reads it between two steps.
-
-    A wave does not even read it. After each call it checks whether the type of the result is the previous one, which it
-    must do anyway; and whoever raises a flag lets it forget those types.
-
-    Attributes:
-      forget: lets the wave that was entered last forget the types of its results; from any thread.
-    """
-
-    __slots__ = ("forget",)
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.forget: Callable[[], None] = _nothing
-
-    @override
-    def append(self, why: str) -> None:
-        """Raise a flag; from any thread. The flag is first, so that a wave without types finds the reason."""
-        super().append(why)
-        self.forget()
-
-    def lower_those_of_waves(self) -> bool:
-        """A wave has ended. Return whether a flag is up that was not only for that wave."""
-        self[:] = [flag for flag in self if flag not in _FOR_A_WAVE]
-        return bool(self)
-
-
-def _nothing() -> None:
-    pass
 
 
 class FusedRegion(Protocol[NodeT]):
@@ -194,11 +157,6 @@ class Code(Protocol[NodeT]):
 
     def interrupt(self, worker: NodeT, *, firing: ConcurrentFiring[NodeT] | None = None) -> None:
         """Cancel or abandon code of the node that is in progress, or that of one of its firings (X2, F14)."""
-
-    async def trigger_wait(
-        self, event: RunningEvent[NodeT], value: object, activity: int | None, stamp: float | None
-    ) -> None:
-        """Trigger an event, then wait until no `wait` queue of the events of its node is full (F8)."""
 
 
 class RuleCallbacks(Protocol[NodeT]):

@@ -16,7 +16,7 @@ from hfg.base.token import Marker, Token
 from hfg.engine.model import ConcurrentFiring, ConcurrentFirings
 from hfg.engine.model.current import current_firing
 from hfg.engine.model.running_node import DISABLED, REMOVED, RunningNode
-from hfg.engine.rules import errors
+from hfg.engine.rules import errors, outputs
 from hfg.engine.rules import firing as firings
 from hfg.engine.rules.agenda import consider, idle_again
 from hfg.engine.rules.calls import refuse_coroutine
@@ -128,7 +128,7 @@ def _complete(firing: ConcurrentFiring, result: Any) -> None:
     try:
         if type(result) is CoroutineType:
             raise refuse_coroutine(worker, result)
-        written = firings.merge(worker, result, firing.take_written(), firing.parameters)
+        written = outputs.merge(worker, result, firing.take_written(), firing.parameters)
     except Exception as error:
         _failed(firing, error)
         return
@@ -359,14 +359,14 @@ def write(worker: RunningNode, position: int, value: Any, activity: int | None, 
     """
     firing = current_firing.get()
     if firing is None or firing.worker is not worker:
-        firings.write(worker, position, value, activity, stamp)  # in end(), or not at all
+        outputs.write(worker, position, value, activity, stamp)  # in end(), or not at all
         return
     if firing.outcome:
         raise UsageError(
             f'output "{worker.path}.{worker.out_names[position]}" was written behind the end of its firing: outputs '
             "belong to process() and end(); trigger an event instead"
         )
-    entry = firings.entry_of(worker, position, firing.written, value, activity, stamp)
+    entry = outputs.entry_of(worker, position, firing.written, value, activity, stamp)
     if entry is not None:
         firing.write(position, entry)
 

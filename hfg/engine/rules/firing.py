@@ -11,30 +11,27 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
-from hfg.base.token import END, NO_MESSAGE, Marker, Token
-from hfg.base.values import own_copy
-from hfg.engine.model.records import SAME_MOMENT_S
+from hfg.base.token import Marker, Token
 from hfg.engine.model.running_node import DISABLED, NO_CALLS, UNREADY, RunningNode
 from hfg.engine.rules import sharing
 from hfg.engine.rules.agenda import consider, idle_again
 from hfg.engine.rules.calls import call, refuse_coroutine, set_parameter
 from hfg.engine.rules.ending import end, end_itself, ends_itself
+from hfg.engine.rules.firing_kinds import kind_of
 from hfg.engine.rules.modifiers import derive_scopes, receive, touch
+from hfg.engine.rules.outputs import merge
 from hfg.engine.rules.releasing import make_room, release
-from hfg.engine.rules.sending import announce, put_outputs, put_value, send_automatic, unwrapped
+from hfg.engine.rules.sending import announce, put_outputs, put_value, send_automatic
 from hfg.engine.rules.wiring import rewire
-from hfg.errors import EndOfStream, UsageError
+from hfg.errors import EndOfStream
 from hfg.ports.edges import VALUE, AnyEdge
 from hfg.trace import FiringEnded, FiringKind, FiringOutcome, FiringStarted, TokenTaken
-from hfg.types import accepts, describe, describe_value
 
 __all__ = [
     "arguments_of",
     "complete_firing",
-    "entry_of",
     "finish_firing",
     "fire",
-    "merge",
     "newest_stamp",
     "note_start",
     "receive_modifiers",
@@ -42,8 +39,6 @@ __all__ = [
     "take",
     "values_of",
     "when_done",
-    "write",
-    "writer",
 ]
 
 
@@ -116,7 +111,7 @@ def fire(worker: RunningNode, *, ends: bool = False) -> None:
         if core.over:
             return
     modifiers = [token.activity for token in tokens if token.activity]
-    kind: Any = "end" if ends else _kind(worker, edges, tokens)
+    kind: Any = "end" if ends else kind_of(worker, edges, tokens)
     if core.trace is not None:
         core.trace(FiringStarted(now, worker.path, worker.counts.firings, kind))
         for edge, token in zip(edges, tokens, strict=True):
@@ -127,6 +122,14 @@ def fire(worker: RunningNode, *, ends: bool = False) -> None:
     if modifiers:
         receive_modifiers(worker, modifiers)
     refused = _set_parameters(worker, edges, tokens)
+    _carry_out(worker, kind, edges, tokens, refused)
+
+
+def _carry_out(
+    worker: RunningNode, kind: Any, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
+) -> None:
+    """Do what F4 has decided; `refused`: a parameter could not be set, so the firing fails (P8)."""
+    core = worker.core
     if worker.concurrent is not None:
         core.rules.begin_concurrent(worker, kind, edges, tokens, refused)
     elif kind == "end":
@@ -251,55 +254,6 @@ def newest_stamp(tokens: Sequence[Token[Any]], now: float) -> float:
     return max(values or [token.stamp for token in tokens], default=now)
 
 
-def _kind(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> FiringKind:
-    """F4: what becomes of a firing; a closed gate makes it silent (A11)."""
-    for edge, token in zip(edges, tokens, strict=True):
-        edge.end(token.value is END)
-    if any(edge.ended for edge in worker.in_edges):
-        if any(edge.ended and edge.mandatory for edge in edges) or _all_ended(worker, edges):
-            return "end"
-        if any(edge.ended for edge in edges):
-            rewire(worker)
-    if _lacks_values(edges, tokens) or (worker.gates_over and _is_held_by_gate(worker)):
-        return "silent"
-    return "process"
-
-
-def _lacks_values(edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> bool:
-    """F4(2): a mandatory input holds NO_MESSAGE, or there is none and no input holds a value."""
-    absent = bool(edges)
-    for edge, token in zip(edges, tokens, strict=True):
-        if edge.mandatory and token.value is NO_MESSAGE:
-            return True
-        if edge.mandatory or type(token.value) is not Marker:
-            absent = False
-    return absent
-
-
-def _is_held_by_gate(worker: RunningNode) -> bool:
-    """A11: a gate over it is closed, and no throttled firing is due; sources rest instead."""
-    return not worker.is_source and any(
-        not gate.state.active and not _idle_turn(worker, gate.idle_rate_hz) for gate in worker.gates_over
-    )
-
-
-def _idle_turn(worker: RunningNode, idle_rate_hz: float | None) -> bool:
-    """A11: a throttled node runs its function as often as the idle rate allows."""
-    return idle_rate_hz is not None and worker.core.now() + SAME_MOMENT_S >= worker.rate.gate_next + 1.0 / idle_rate_hz
-
-
-def _all_ended(worker: RunningNode, taking_part: Sequence[Any]) -> bool:
-    """F4(1): every live input has ended; edges with initial tokens do not count, and one other must have.
-
-    Args:
-      worker: whose inputs.
-      taking_part: the edges of this firing; also one whose source was disabled and that still delivers (F10).
-    """
-    live = [edge for edge in worker.in_edges if edge in taking_part or (edge.live and edge.joins())]
-    counted = [edge for edge in live if not getattr(edge, "initial", ())]
-    return bool(counted) and all(edge.ended for edge in counted)
-
-
 def _set_parameters(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> Exception | None:
     """P8: a token sets the parameter when it is taken, also in a silent firing; gives why one cannot be set."""
     for edge, token in zip(edges, tokens, strict=True):
@@ -404,110 +358,6 @@ def complete_firing(worker: RunningNode, result: object) -> None:
     if worker.shape.remembers:
         worker.execution.recall()
     finish_firing(worker, "done")
-
-
-def merge(
-    worker: RunningNode, result: object, written: list[Any] | None, parameters: dict[str, Any] | None = None
-) -> list[Any] | None:
-    """Join what was returned with what was sent; both for one output is writing twice (F3).
-
-    Args:
-      worker: whose firing is over.
-      result: the result of its function.
-      written: what it has sent, by output.
-      parameters: what the node's were in this firing; by default as they are now.
-    """
-    node_type = worker.type
-    if result is not None:
-        values = worker.node._split(result)
-        if written is None:
-            written = [None] * len(worker.out_edges)
-        for position, value in enumerate(values):
-            if value is None:
-                continue
-            if written[position] is not None:
-                raise UsageError(
-                    f'output "{worker.path}.{worker.out_names[position]}" was written twice in one '
-                    f"firing: return or send, once"
-                )
-            written[position] = unwrapped(value)
-    if worker.core.debug:
-        _check_values(worker, written)
-    if node_type is not None and node_type.parameters:
-        written = _add_parameters(worker, written, worker.node._parameters if parameters is None else parameters)
-    return written
-
-
-def _check_values(worker: RunningNode, written: list[Any] | None) -> None:
-    """In debug mode: what leaves is of its output's type, and what was taken is as it was (T1)."""
-    sharing.need_unchanged(worker)
-    for position, (name, spec) in enumerate(worker.type.outputs.items() if written is not None else ()):
-        entry = written[position]  # type: ignore[index]
-        if entry is None:
-            continue
-        if not accepts(entry[0], spec.type):
-            raise TypeError(
-                f'output "{worker.path}.{name}" is declared {describe(spec.type)}, got {describe_value(entry[0])}'
-            )
-        sharing.need_unwritten(worker, name, entry[0])
-
-
-def _add_parameters(worker: RunningNode, written: list[Any] | None, parameters: dict[str, Any]) -> list[Any]:
-    """P8: a connected parameter sends its value with each firing that is not silent."""
-    if written is None:
-        written = [None] * len(worker.out_edges)
-    for position in range(len(worker.type.outputs), len(worker.out_names)):
-        value = parameters[worker.out_names[position]]
-        written[position] = (own_copy(value), None, None)  # the node may change its own (T1)
-    return written
-
-
-def writer(worker: RunningNode, position: int) -> Callable[[Any, int | None, float | None], None]:
-    """What the `send` of an output does: `write`, with the plain case at hand."""
-
-    def emit(value: Any, activity: int | None, stamp: float | None) -> None:
-        if worker.busy == "firing" and worker.written is None and value is not None and type(value) is not Token:
-            worker.write(position, (value, activity, stamp))
-        else:
-            write(worker, position, value, activity, stamp)
-
-    return emit
-
-
-def write(worker: RunningNode, position: int, value: object, activity: int | None, stamp: float | None) -> None:
-    """A node's code writes to an output: it leaves when the firing is over (F3).
-
-    Raises:
-      UsageError: outside a firing (also in a slot handler, F9), or twice in one firing.
-    """
-    if worker.busy not in ("firing", "ending") and (worker.region is None or not worker.region.is_sending(worker)):
-        called = worker.busy == "call" or (not worker.busy and worker.stamp is not None)  # the fast path of calls
-        where = "in a slot handler" if called else "outside a firing"
-        raise UsageError(
-            f'output "{worker.path}.{worker.out_names[position]}" was written {where}: outputs belong to process() and '
-            "end(); trigger an event instead"
-        )
-    entry = entry_of(worker, position, worker.written, value, activity, stamp)
-    if entry is not None:
-        worker.write(position, entry)
-
-
-def entry_of(
-    worker: RunningNode, position: int, written: list[Any] | None, value: Any, activity: int | None, stamp: float | None
-) -> tuple[Any, int | None, float | None] | None:
-    """What a node's code writes to an output of which nothing was written before; None is silence (T2).
-
-    Raises:
-      UsageError: something was.
-    """
-    if value is None:
-        return None
-    if written is not None and written[position] is not None:
-        raise UsageError(
-            f'output "{worker.path}.{worker.out_names[position]}" was written twice in one firing: it takes one token, '
-            "merge the values or use an event"
-        )
-    return unwrapped(value, activity, stamp)
 
 
 def finish_firing(worker: RunningNode, outcome: FiringOutcome) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from hfg.base.token import NO_MESSAGE, Marker
 from hfg.engine.model import Core, Iteration, RunningNode
-from hfg.engine.rules import firing, quiescence, rings
+from hfg.engine.rules import firing, quiescence, rings, waits
 from hfg.engine.rules.releasing import take_from_reader
 from hfg.engine.rules.sending import put_outputs
 
@@ -58,7 +58,7 @@ def _settle(iteration: Iteration) -> bool:
     core = iteration.worker.core
     if not iteration.is_under_way or core.over or iteration.is_moving():
         return False
-    if core.full_edges and any([rings.is_held(worker) for worker in iteration.members]):  # noqa: C419 - each sets its timer
+    if core.full_edges and any([waits.is_held(worker) for worker in iteration.members]):  # noqa: C419 - each sets its timer
         if rings.resolve(core):
             return True
         if iteration.is_moving():

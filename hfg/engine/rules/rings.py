@@ -16,59 +16,43 @@ from __future__ import annotations
 import logging
 from collections import deque
 from collections.abc import Iterable, Iterator
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 from hfg.engine.model import Core
 from hfg.engine.model.running_node import (
-    AT_CONCURRENCY,
     BACKOFF,
     BETWEEN_FIRINGS,
     ENDED,
-    FIRES_NO_MORE,
     FULL,
     RATE,
     RunningNode,
 )
-from hfg.engine.rules.agenda import freed, must_wait
+from hfg.engine.rules.agenda import freed
+from hfg.engine.rules.waits import (
+    CALL,
+    ELSEWHERE,
+    FIRE,
+    NEVER,
+    RING,
+    ROOM,
+    TELL,
+    Action,
+    Wait,
+    full_edges,
+    is_held,
+    taking,
+    wait_for,
+    works,
+    works_on_firing,
+)
 from hfg.errors import QueueLimit, RunError
 from hfg.graph.flat.order import strongly_connected
-from hfg.ports.edges import AnyEdge, EventEdge
+from hfg.ports.edges import EventEdge
 from hfg.trace import QueueGrown
 
 _LOGGER = logging.getLogger("hfg.engine")
 
-__all__ = ["grow_queue", "is_held", "look_at_all", "resolve", "smallest_at_rest"]
-
-Action: TypeAlias = "tuple[RunningNode | None, str]"
-"""What somebody waits for: that a worker does something. None stands for the other parts of a graph that is cut."""
-
-_FIRE: Final = "fire"  # begins its next firing
-_CALL: Final = "call"  # begins its next slot call
-_TELL: Final = "tell"  # triggers an event
-_RING: Final = "ring"  # the same, by a timer
-_FINISH: Final = "finish"  # ends the firing or call in progress, and with it what follows (F5)
-_ROOM: Final = "room"  # has room in each queue that its events fill
-_HEAR: Final = "hear"  # gets a token for one of its slots
-
-_ELSEWHERE: Final[Action] = (None, "elsewhere")
-
-
-class _Wait:
-    """Why an action does not happen now.
-
-    Attributes:
-      on: what it waits for.
-      any_of: one of these suffices to let it happen; else all of them must, and none at all means: never.
-    """
-
-    __slots__ = ("any_of", "on")
-
-    def __init__(self, on: list[Action], *, any_of: bool = False) -> None:
-        self.on = on
-        self.any_of = any_of
-
-
-_NEVER = _Wait([], any_of=True)
+__all__ = ["grow_queue", "look_at_all", "resolve", "smallest_at_rest"]
 
 
 def resolve(core: Core) -> bool:
@@ -196,7 +180,7 @@ class _Walk:
     def __init__(self, core: Core, *, at_rest: bool = False) -> None:
         self._core = core
         self._at_rest = at_rest
-        self._waits: dict[Action, _Wait] = {}
+        self._waits: dict[Action, Wait] = {}
         self._may: dict[Action, RunningNode | None] = {}  # what may happen by itself: whose code or timer that is
         self._opened: dict[Action, Action | None] = {}  # what may happen, and by which other action that was found
 
@@ -204,7 +188,7 @@ class _Walk:
 
     def smallest_of_rings(self, held: Iterable[RunningNode]) -> list[EventEdge]:
         """Return for each ring its full queue with the smallest capacity; a ring that waits for another comes later."""
-        self._follow([(worker, _ROOM) for worker in held])
+        self._follow([(worker, ROOM) for worker in held])
         self._open()
         stuck = [action for action in self._waits if action not in self._opened]
         numbers = {action: number for number, action in enumerate(stuck)}
@@ -227,9 +211,9 @@ class _Walk:
         full = [
             edge
             for worker, what in ring
-            if what == _ROOM and worker is not None and is_held(worker)
-            for edge in _full_edges(worker)
-            if _taking(edge) in ring
+            if what == ROOM and worker is not None and is_held(worker)
+            for edge in full_edges(worker)
+            if taking(edge) in ring
         ]
         return min(full, key=_size, default=None)
 
@@ -242,7 +226,7 @@ class _Walk:
             if action in self._waits or action in self._may:
                 continue
             wait = self._look(action)
-            if isinstance(wait, _Wait):
+            if isinstance(wait, Wait):
                 self._waits[action] = wait
                 waiting += wait.on
             else:
@@ -275,20 +259,20 @@ class _Walk:
         for worker in held:
             if not all([self._will_tell(reason, worker) for reason in self._reasons(worker)]):  # noqa: C419 - each
                 again.append(worker)
-            if (worker, _ROOM) not in self._opened:
+            if (worker, ROOM) not in self._opened:
                 worker.room.notify_watchers()
         return again
 
     def _reasons(self, held: RunningNode) -> Iterator[Action]:
         """Return what may happen by itself, and who else is held back and has reasons of its own."""
-        begin: Action = (held, _ROOM)
+        begin: Action = (held, ROOM)
         if begin not in self._opened:
             yield begin
             return
         waiting, seen = [begin], {begin}
         while waiting:
             action = waiting.pop()
-            if action in self._may or (action[1] == _ROOM and action != begin):
+            if action in self._may or (action[1] == ROOM and action != begin):
                 yield action
                 continue
             wait, by = self._waits[action], self._opened[action]
@@ -312,131 +296,40 @@ class _Walk:
 
     # --- what each action waits for ---------------------------------------------------------------------------------
 
-    def _look(self, action: Action) -> _Wait | RunningNode | None:
+    def _look(self, action: Action) -> Wait | RunningNode | None:
         """Return what an action waits for, or the node that may do it by itself; None if no one reports its end."""
         worker, what = action
         if worker is None:
             return self._elsewhere()
-        if what == _RING:
+        if what == RING:
             return None
-        if what == _ROOM:
-            full = _full_edges(worker)
-            return _Wait([_taking(edge) for edge in full]) if full else worker
+        if what == ROOM:
+            full = full_edges(worker)
+            return Wait([taking(edge) for edge in full]) if full else worker
         if worker.region is not None:
             worker.region.disarm()  # while it is armed, only its head says that a token is not processed
-        if worker.node is None and worker.scope is None and not (worker is self._core.boundary and what == _CALL):
+        if worker.node is None and worker.scope is None and not (worker is self._core.boundary and what == CALL):
             return self._at_border(worker)
-        if what == _FIRE:
-            return _fire(worker)
-        if what == _CALL:
-            return _call(worker)
-        if what == _TELL:
-            return _tell(worker)
-        return _finish(worker) if what == _FINISH else _hear(worker)
+        return wait_for(worker, what)
 
-    def _at_border(self, worker: RunningNode) -> _Wait | RunningNode:
+    def _at_border(self, worker: RunningNode) -> Wait | RunningNode:
         """Nodes that stand for the graph's own ports, for other parts of it, or for the border of an iteration."""
         core = self._core
         if worker in core.outlets or worker in core.inlets:
-            return _Wait([_ELSEWHERE]) if self._at_rest else worker
+            return Wait([ELSEWHERE]) if self._at_rest else worker
         if not worker.port_name or worker.blocked & ENDED:
-            return _NEVER  # `start` has been triggered, and subscribers do not count
+            return NEVER  # `start` has been triggered, and subscribers do not count
         return worker
 
-    def _elsewhere(self) -> _Wait:
+    def _elsewhere(self) -> Wait:
         """The other parts wait as well: for nodes that send to them, or take from them."""
         core = self._core
         sources = [edge.source for outlet in core.outlets for edge in outlet.in_edges]
-        told = [(source, what) for source in sources for what in (_FIRE, _TELL)]
-        return _Wait([*told, *(_taking(edge) for inlet in core.inlets for edge in inlet.all_out_edges())])
+        told = [(source, what) for source in sources for what in (FIRE, TELL)]
+        return Wait([*told, *(taking(edge) for inlet in core.inlets for edge in inlet.all_out_edges())])
 
 
 # --- what each action waits for ---------------------------------------------------------------------------------------
-
-
-def _fire(worker: RunningNode) -> _Wait | RunningNode:
-    """F1: all that its next firing waits for."""
-    blocked = worker.blocked
-    if _works_on_firing(worker) or blocked & BACKOFF:
-        return worker
-    on = _processing(worker)
-    if blocked & FIRES_NO_MORE or worker.process is None:
-        return _Wait(on) if worker.pending_end and on else _NEVER
-    on += [_sending(edge) for edge in worker.live_inputs if not edge.untaken]
-    if blocked & FULL and _counts(worker, on):
-        on.append((worker, _ROOM))
-    return _Wait(on) if on else worker
-
-
-def _counts(worker: RunningNode, waits_for: list[Action]) -> bool:
-    """Whether only F8 holds its next firing: not also a rate, a gate, `ready()` or a call."""
-    if worker.room.waiting:
-        return True
-    if worker.blocked & ~(FULL | AT_CONCURRENCY) or worker.busy not in BETWEEN_FIRINGS:
-        return False
-    return bool(waits_for) or not (worker.paced and must_wait(worker))
-
-
-def _call(worker: RunningNode) -> _Wait | RunningNode:
-    """F9: all that its next slot call waits for."""
-    if worker.blocked >= BACKOFF or _works(worker):
-        return worker
-    on: list[Action] = [(worker, _ROOM)] if worker.blocked & FULL else []
-    if not worker.calls:
-        on.append((worker, _HEAR))
-    return _Wait(on) if on else worker
-
-
-def _hear(worker: RunningNode) -> _Wait:
-    """A token at one of its slots: any will do."""
-    return _Wait([_sending(edge) for edge in worker.called_by() if edge.live], any_of=True)
-
-
-def _tell(worker: RunningNode) -> _Wait | None:
-    """A signal of its own: by whatever code of it runs next."""
-    if worker.tasks is not None and worker.tasks.move:
-        return None
-    on: list[Action] = [(worker, _CALL)]
-    if worker.scope is None:
-        on.append((worker, _FIRE))
-    else:
-        on += [(inside, _TELL) for inside in worker.scope.inside()]
-    if worker.codes_waiting_for_room():
-        on.append((worker, _ROOM))
-    return _Wait(on, any_of=True)
-
-
-def _finish(worker: RunningNode) -> _Wait | RunningNode:
-    """F5, F6: that all is processed of the firing or call that has taken a token."""
-    if _works(worker):
-        return worker
-    on = _processing(worker)
-    if worker.room.waiting:
-        on.append((worker, _ROOM))
-    return _Wait(on) if on else worker
-
-
-def _processing(worker: RunningNode) -> list[Action]:
-    """F5: what its outputs wait for."""
-    edges = [edge for edges in worker.out_edges for edge in edges if edge.unprocessed]
-    return [_taking(edge) if edge.untaken else (edge.target, _FINISH) for edge in edges]
-
-
-def _sending(edge: AnyEdge) -> Action:
-    """Return the action that would put a token on this edge."""
-    source: RunningNode = edge.source
-    if type(edge) is not EventEdge:
-        return source, _FIRE
-    timeout = source.events.get("timeout") if source.active_timer is not None else None
-    by_timer = edge.ripening or (timeout is not None and edge in timeout.edges)
-    return source, _RING if by_timer else _TELL
-
-
-def _taking(edge: AnyEdge) -> Action:
-    """Return the action that would take the oldest token from this edge."""
-    target: RunningNode = edge.target
-    called = edge.target_kind == "slot" or (edge.target_kind == "parameter" and type(edge) is EventEdge)
-    return target, _CALL if called else _FIRE
 
 
 # --- of one node ------------------------------------------------------------------------------------------------------
@@ -446,42 +339,9 @@ def _size(edge: EventEdge) -> tuple[int, float]:
     return edge.capacity, edge.index
 
 
-def _full_edges(worker: RunningNode) -> list[EventEdge]:
-    return [edge for edge in worker.event_edges() if edge.full]
-
-
-def _works(worker: RunningNode) -> bool:
-    """Whether a firing or call is in progress that does not only wait for room."""
-    if worker.concurrent is None:
-        return worker.busy not in BETWEEN_FIRINGS and not worker.room.waiting  # an edit that holds it changes no wait
-    unfinished = sum(not started.outcome for started in worker.concurrent)
-    return unfinished + (worker.busy not in BETWEEN_FIRINGS) > worker.room.waiting
-
-
-def _works_on_firing(worker: RunningNode) -> bool:
-    """The same, but for a slot call that excludes firings (F9)."""
-    return _works(worker) and (worker.concurrent is not None or worker.busy != "call")
-
-
-def is_held(worker: RunningNode) -> bool:
-    """Whether only a full queue holds it back: code that waits for room, a slot call, or its next firing.
-
-    A rate that holds it too is to be over first.
-    """
-    if worker.codes_waiting_for_room():
-        return True
-    if not worker.blocked & FULL or worker.busy not in BETWEEN_FIRINGS:
-        return False
-    if worker.calls and worker.blocked < BACKOFF:
-        return True
-    if worker.blocked != FULL or worker.process is None or any(not edge.untaken for edge in worker.live_inputs):
-        return False
-    return not _processing(worker) and not (worker.paced and must_wait(worker))
-
-
 def _goes_on(worker: RunningNode, what: str) -> bool:
     """Whether its code, or the timer of a rate that is the only delay, is in progress; both report their end."""
-    if worker.execution.in_flight or (what == _FIRE and worker.blocked & RATE):
+    if worker.execution.in_flight or (what == FIRE and worker.blocked & RATE):
         return True
     return worker.concurrent is not None and worker.concurrent.working > 0
 
@@ -495,8 +355,8 @@ def _plainly_goes_on(held: RunningNode, known: dict[RunningNode, bool]) -> bool:
     worker = held
     while worker not in known:
         chain[worker] = None
-        full = _full_edges(worker)
-        target, what = _taking(full[0])
+        full = full_edges(worker)
+        target, what = taking(full[0])
         if len(full) > 1 or target is None or target in chain:
             known[worker] = False
         elif _takes_next(target, what):
@@ -512,12 +372,12 @@ def _plainly_goes_on(held: RunningNode, known: dict[RunningNode, bool]) -> bool:
 def _takes_next(worker: RunningNode, what: str) -> bool:
     if worker.queued and not worker.group.threaded:
         return True
-    return _works(worker) if what == _CALL else _works_on_firing(worker)
+    return works(worker) if what == CALL else works_on_firing(worker)
 
 
 def _has_only_to_have_room(worker: RunningNode, what: str) -> bool:
     if worker.busy not in BETWEEN_FIRINGS or not worker.room.full_edges or worker.paced:
         return False
-    if what == _CALL:
+    if what == CALL:
         return worker.blocked < BACKOFF
     return worker.blocked == FULL and not (worker.inputs.missing or worker.outputs.missing)

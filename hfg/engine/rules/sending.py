@@ -12,31 +12,27 @@ from typing import Any, TypeAlias
 from hfg.activity.rules import asked_for, leaving
 from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.engine.model import Core, RunningEvent
-from hfg.engine.model.running_node import BETWEEN_FIRINGS, DISABLED, ENDED, RATE, RunningNode
-from hfg.engine.rules.agenda import add_call, arrived, note_full, queue_next_in_wave
-from hfg.engine.rules.listening import listens, may_listen
+from hfg.engine.model.running_node import BETWEEN_FIRINGS, DISABLED, RATE, RunningNode
+from hfg.engine.rules.agenda import queue_next_in_wave
 from hfg.engine.rules.modifiers import (
     automatic,
-    count_dropped,
     derive_scopes,
-    drop,
     give_back,
     receive,
     set_active,
     touch,
 )
+from hfg.engine.rules.putting import put, put_signal
 from hfg.errors import QueueOverflow
-from hfg.ports.edges import ACTIVITY, AnyEdge, BufferEdge, EventEdge, Lying, SyncEdge
-from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenProcessed, TokenSent
+from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
+from hfg.trace import EventTriggered, NodeEnded
 
 __all__ = [
     "activity_left",
     "announce",
-    "bring_activity",
     "deferring_events",
     "emit_automatic",
     "enqueue",
-    "put",
     "put_arrived",
     "put_outputs",
     "put_value",
@@ -164,75 +160,6 @@ def activity_left(worker: RunningNode) -> None:
         set_active(worker, False, "sent")
 
 
-def put(edge: SyncEdge | BufferEdge, value: object, modifier: int, stamp: float) -> None:
-    """Put one token on a synchronous edge."""
-    token = Token(value, modifier, stamp, edge.number())
-    target: RunningNode = edge.target
-    core = target.core
-    if core.trace is not None or edge.tap is not None:
-        _show(edge, token)
-    if core.sharing is not None:
-        core.sharing.sent(edge, token)
-    slot = edge.target_kind == "slot"
-    if _is_unheard(edge, value, modifier) if slot else target.blocked & ENDED:
-        _drain(edge, (value, modifier, stamp, token.sequence))
-        return
-    if modifier > 0:
-        bring_activity(target)
-    if edge.put(token):
-        edge.waits.outputs.expect()
-    elif core.trace is not None:
-        core.trace(TokenProcessed(core.now(), edge.label))
-    if slot:
-        add_call(target, edge)
-        return
-    if type(value) is Marker:
-        target.mark_special()
-    if type(edge) is SyncEdge or len(edge.queue) == 1:  # type: ignore[union-attr]
-        arrived(edge)
-
-
-def _show(edge: AnyEdge, token: Token[Any]) -> None:
-    """The token is sent: whoever looks sees it (R7)."""
-    core: Core = edge.target.core
-    if core.trace is not None:
-        core.trace(TokenSent(core.now(), edge.label, token))
-    if edge.tap is not None:
-        edge.tap(token)
-
-
-def _is_unheard(edge: AnyEdge, value: object, modifier: int) -> bool:
-    """T4: a slot is not called by a marker, nor while it does not listen: the token is processed at once."""
-    return type(value) is Marker or (edge.while_active and modifier <= 0 and not listens(edge.target))
-
-
-def bring_activity(target: RunningNode) -> None:
-    """A token with +1 lies before a node: it is about to listen (T4), and subgraphs around it are to look (G2)."""
-    if target.listened is not None:
-        may_listen(target)
-    if target.scopes:
-        touch(target.core, target.scopes)
-
-
-def _drain(edge: AnyEdge, lying: Lying) -> None:
-    """T4, F12: the token is processed immediately, without a firing or call; its modifier acts after the sending."""
-    target: RunningNode = edge.target
-    core = target.core
-    modifier = lying[ACTIVITY]
-    into_slot = edge.target_kind == "slot"
-    if not into_slot:
-        edge.count_drained()
-    if core.trace is not None:
-        core.trace(TokenDrained(core.now(), edge.label, Token(*lying)))
-    if modifier:
-        if not into_slot and target.ending is not None and target.ending.deferred is not None:
-            target.ending.defer(modifier)
-            if target.scopes:
-                touch(core, target.scopes)
-        else:
-            core.drained.append((target, modifier))
-
-
 def sent(core: Core) -> None:
     """The sending is on its edges: activity that got nowhere goes back, what was drained acts, the rest follows."""
     if core.returned:
@@ -317,7 +244,7 @@ def trigger(
         if edge.pipeline is not None:
             _into_operators(edge, Token(value, modifier, stamp))
         else:
-            _append(edge, value, modifier, stamp)
+            put_signal(edge, value, modifier, stamp)
     if carried:
         activity_left(worker)
     sent(core)
@@ -392,53 +319,8 @@ def _into_operators(edge: EventEdge, token: Token[Any]) -> None:
 
 def enqueue(edge: EventEdge, value: object, modifier: int, stamp: float) -> None:
     """One token on one event edge, a sending of its own."""
-    _append(edge, value, modifier, stamp)
+    put_signal(edge, value, modifier, stamp)
     sent(edge.target.core)
-
-
-def _append(edge: EventEdge, value: object, modifier: int, stamp: float) -> None:
-    """Put one token into the queue of an event edge, by its policy (P5, F8)."""
-    lying = (value, modifier, stamp, edge.number())
-    target: RunningNode = edge.target
-    core = target.core
-    if core.trace is not None or edge.tap is not None:
-        _show(edge, Token(*lying))
-    if core.sharing is not None:
-        core.sharing.sent(edge, Token(*lying))
-    if edge.end_sent and value is not END:  # END came first: no consumer waits for anything after it (F13)
-        count_dropped(edge, Token(*lying), "ended")
-        if modifier > 0:
-            core.returned.append(edge)
-        return
-    joins = edge.joins()
-    if target.blocked & ENDED if joins else _is_unheard(edge, value, modifier):
-        _drain(edge, lying)
-        return
-    if modifier > 0:
-        bring_activity(target)
-    holds_one = bool(edge.queue)
-    if edge.overflows() and not _has_made_room(edge, lying):
-        return
-    edge.lay(lying)
-    note_full(edge)
-    if not joins:
-        add_call(target, edge)
-        return
-    if type(value) is Marker:
-        target.mark_special()
-    if not edge.live:  # its operators held it back until its sender was disabled (P9, F10)
-        core.rules.rewire(target)
-    elif not holds_one:
-        arrived(edge)
-
-
-def _has_made_room(edge: EventEdge, lying: Lying) -> bool:
-    """P5: one token too many: the oldest goes, or this one does."""
-    oldest = edge.overflow != "drop_newest"
-    drop(edge, edge.take() if oldest else Token(*lying), "overflow")
-    if oldest and not edge.joins():
-        edge.target.forget_call(edge)
-    return oldest
 
 
 def emit_automatic(worker: RunningNode) -> None:

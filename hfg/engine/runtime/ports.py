@@ -10,9 +10,10 @@ from functools import partial
 from typing import Any
 
 from hfg.base.token import Token
+from hfg.engine.executing.room import trigger_wait
 from hfg.engine.fusion import slots
 from hfg.engine.model import RunningEvent, RunningNode
-from hfg.engine.rules import concurrency, firing, task_ports
+from hfg.engine.rules import concurrency, outputs, task_ports
 from hfg.engine.rules.sending import trigger
 from hfg.engine.rules.sharing import need_unwritten
 from hfg.engine.runtime import plan, relays
@@ -36,7 +37,7 @@ def bind(worker: RunningNode) -> None:
     ports = node.ports
     for position, name in enumerate(node_type.outputs):
         beyond_one = worker.concurrent is not None
-        emit = partial(concurrency.write, worker, position) if beyond_one else firing.writer(worker, position)
+        emit = partial(concurrency.write, worker, position) if beyond_one else outputs.writer(worker, position)
         ports.outputs[name]._connect(emit if worker.tasks is None else task_ports.refusing(worker, position, emit))
     for name in node_type.events:
         bind_event(worker, name)
@@ -98,7 +99,7 @@ def _connect(event: RunningEvent, port: EventPort[Any]) -> None:
     debug = worker.core.debug
     overlapping = worker.concurrent is not None or worker.attempts is not None
     shortcut: Callable[..., None] | None = None
-    wait: Callable[..., Any] = partial(worker.core.code.trigger_wait, event)
+    wait: Callable[..., Any] = partial(trigger_wait, event)
     if worker.group.threaded:
         emit: Callable[..., Any] = partial(_from_thread, worker, event)
     else:

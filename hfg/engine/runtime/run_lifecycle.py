@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -27,8 +27,9 @@ from hfg.engine.rules.agenda import consider, note_full
 from hfg.engine.rules.modifiers import discard
 from hfg.engine.rules.sending import trigger
 from hfg.engine.runtime import ports as engine_ports
-from hfg.engine.runtime import rx
+from hfg.engine.runtime.edge_streams import EdgeStreams
 from hfg.engine.runtime.engine import Engine
+from hfg.engine.runtime.teardown_limit import TeardownLimit
 from hfg.errors import HfgError, NodeError, TeardownError
 from hfg.ports.edges import BufferEdge, EventEdge
 from hfg.trace import RunEnded, RunStarted
@@ -42,22 +43,21 @@ class RunLifecycle:
     """Begins and ends the run of one engine.
 
     Attributes:
+      streams: operators on edges, and observables that feed edges.
       leaving: the teardowns of nodes that an edit took out; the end of the run waits for them.
     """
 
     def __init__(self, engine: Engine, last: Callable[[], Awaitable[None]]) -> None:
         self._engine = engine
         self._last = last  # what is waited for when everything else is over
-        self._leave_by = float("inf")
+        self._limit = TeardownLimit(engine)
         self.leaving: set[asyncio.Task[None]] = set()
         self._was_set_up: dict[RunningNode, None] = {}
-        self._disposables: dict[Any, Callable[[], None]] = {}  # by edge: operators and observables before it
+        self.streams = EdgeStreams(engine)
         self._watch: Watch | None = None
         self._asking = partial(speaker, engine.core)
         self._lost: OrphanTasks | None = None
         self._of_tasks: list[NodeError] = []  # with what they failed, or that they did not end
-        # Around what the teardown waits for now. Made here, for the first of a process takes a while: not in a hurry.
-        self._patience = anyio.CancelScope()
 
     async def start(self) -> None:
         """Set up all nodes, trigger `start`, then let the sources go (A10)."""
@@ -92,7 +92,7 @@ class RunLifecycle:
             trigger(start, explicit=1)
         self._open_sources(core)
         for source, edge, operators in core.observables:
-            self.feed(source, edge, operators)
+            self.streams.feed(source, edge, operators)
         for told in engine.callbacks.begun:
             told()
         engine.kick()
@@ -129,7 +129,7 @@ class RunLifecycle:
     def _connect_operators(self, core: Core) -> None:
         """P9: before anything is triggered; what they give out by themselves is the first of all."""
         for edge, operators in core.piped:
-            self.pipe(edge, operators)
+            self.streams.pipe(edge, operators)
 
     def _open_sources(self, core: Core) -> None:
         """Sources may fire from now on, as far as their gates allow."""
@@ -159,43 +159,13 @@ class RunLifecycle:
         if error is not None:
             engine.finish("failed", error)
 
-    def pipe(self, edge: Any, operators: tuple[Any, ...]) -> None:
-        """Put operators on an edge (P9)."""
-        self._disposables[edge] = rx.pipe_edge(edge, operators, self._engine)
-
     def came(self, worker: RunningNode) -> None:
         """A node was set up while the run was in progress (R4)."""
         self._was_set_up[worker] = None
 
-    def forget(self, one: Any) -> None:
-        """An edge, or a node that was torn down, is no longer part of the run (R4)."""
-        if one in self._disposables:
-            self._disposables.pop(one)()
-        else:
-            self._was_set_up.pop(one, None)
-
-    def feed(self, source: Any, edge: Any, operators: tuple[Any, ...]) -> None:
-        """An outside observable holds the run open until it completes (R5)."""
-        engine = self._engine
-        engine.quiet.hold()
-        open_ = [True]
-
-        def over(error: BaseException | None) -> None:
-            if open_[0]:
-                open_[0] = False
-                if error is not None:
-                    problem = NodeError(edge.target.path, f'the observable that feeds "{edge.label}"', error)
-                    problem.__cause__ = error
-                    engine.finish("failed", problem)
-                engine.quiet.unhold()
-
-        dispose = rx.feed_from_observable(source, edge, operators, engine.scheduler, engine.from_any_thread, over)
-
-        def stop() -> None:
-            dispose()
-            over(None)
-
-        self._disposables[edge] = stop
+    def went(self, worker: RunningNode) -> None:
+        """A node was torn down while the run was in progress (R4)."""
+        self._was_set_up.pop(worker, None)
 
     def _until(self) -> None:
         engine = self._engine
@@ -234,10 +204,9 @@ class RunLifecycle:
         outcome, error = engine.ended_how
         problems: list[NodeError] = []
         try:
-            for dispose in self._disposables.values():
-                dispose()
+            self.streams.dispose()
             if self.leaving:
-                with self._within_limit():
+                with self._limit.applied():
                     await asyncio.wait(self.leaving)
             stuck = await self._cancel_code()
             problems += [*stuck.values(), *self._of_tasks]
@@ -293,54 +262,18 @@ class RunLifecycle:
             return
         for eager_task in eager_tasks:
             eager_task.cancel()
-        await self._until_back(lambda: any(eager_task.waiting for eager_task in eager_tasks))
+        await self._limit.wait_while(lambda: any(eager_task.waiting for eager_task in eager_tasks))
         for eager_task in eager_tasks:
             eager_task.drop()
         await asyncio.wait({eager_task.task for eager_task in eager_tasks})
 
-    @contextmanager
-    def _within_limit(self) -> Iterator[None]:
-        """Wait in it as long as a node may take for its teardown (X3); `hurry` moves the moment it is left at."""
-        limit_s = self._limit_s
-        self._engine.code.hold_no_longer_than(limit_s)
-        with anyio.CancelScope(deadline=self._in(limit_s)) as self._patience:
-            yield
-
-    def _in(self, seconds: float) -> float:
-        """So many seconds from now, to the nanosecond, as virtual time counts: else a time limit is over behind it."""
-        return round(self._engine.loop.time() + seconds, 9)
-
-    @property
-    def _limit_s(self) -> float:
-        """X3: how long one node may take; when somebody wants to leave, what is left for all of them."""
-        return max(0.0, min(self._engine.settings.teardown_limit_s, self._leave_by - time.monotonic()))
-
     def hurry(self) -> None:
-        """Somebody wants to leave: tear down what can be torn down in 1.5 s, for in two the process is to be over."""
-        if not self._in_a_hurry:
-            self._leave_within(1.5)
+        """The user wants to leave: tear down whatever can be torn down in time."""
+        self._limit.hurry()
 
     def leave_now(self) -> None:
-        """Somebody is tired of waiting: wait for nothing any more."""
-        self._leave_within(0.0)
-
-    @property
-    def _in_a_hurry(self) -> bool:
-        return self._leave_by != float("inf")
-
-    def _leave_within(self, seconds: float) -> None:
-        """What is waited for now has less time from here on."""
-        engine = self._engine
-        self._leave_by = time.monotonic() + seconds
-        engine.code.hold_no_longer_than(self._limit_s)
-        self._patience.deadline = min(self._patience.deadline, self._in(self._limit_s))
-
-    async def _until_back(self, under_way: Callable[[], bool]) -> None:
-        code = self._engine.code
-        with self._within_limit():
-            while under_way():
-                code.came_back.clear()
-                await code.came_back.wait()
+        """The user is tired of waiting: stop waiting altogether."""
+        self._limit.leave_now()
 
     async def _cancel_code(self) -> dict[RunningNode, NodeError]:
         """Cancel what still waits; threads get their time to come back. Gives back who did not."""
@@ -361,7 +294,7 @@ class RunLifecycle:
         tasks.cancel_all()
         begun = time.monotonic()
         if busy or concurrent or tasks.under_way or code.aside:
-            await self._until_back(
+            await self._limit.wait_while(
                 lambda: (
                     bool(tasks.under_way or code.aside)
                     or any(worker.execution.in_flight for worker in busy)
@@ -411,16 +344,16 @@ class RunLifecycle:
         if waiter.done():
             return waiter.result()
         begun = time.monotonic()
-        with self._within_limit():
+        with self._limit.applied():
             await asyncio.wait({waiter})
         if waiter.done():
             return waiter.result()
         limit = f"{engine.settings.teardown_limit_s:g}"
-        if self._in_a_hurry:
+        if self._limit.is_shortened:
             limit = f"{time.monotonic() - begun:.1f}"
         engine.code.interrupt(worker)
         if not worker.group.threaded:  # what it still has to do when it is cancelled comes before the next teardown
-            with anyio.CancelScope(deadline=self._in(min(_LEAVING_S, self._limit_s))):
+            with anyio.CancelScope(deadline=self._limit.deadline(min(_LEAVING_S, self._limit.seconds))):
                 await asyncio.wait({waiter})
         return NodeError(worker.path, "teardown()", f"it took longer than {limit} s and was given up")
 

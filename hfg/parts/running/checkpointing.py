@@ -22,7 +22,8 @@ from hfg.encoding import TokenCodec, data
 from hfg.engine.model.running_node import ENDED, RunningNode
 from hfg.engine.rules.agenda import consider, queue_next_in_wave
 from hfg.engine.rules.ending import drain_left
-from hfg.engine.rules.sending import enqueue, put
+from hfg.engine.rules.putting import put
+from hfg.engine.rules.sending import enqueue
 from hfg.engine.runtime.borders import Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
 from hfg.errors import EncodingError, HfgError, RunError
