@@ -9,7 +9,7 @@ __all__ = ["Pump"]
 
 
 class Pump(Protocol):
-    """What the code of nodes needs from the engine."""
+    """The engine, as the code of nodes needs it."""
 
     beside_work: int
 

@@ -1,4 +1,4 @@
-"""How code waits until the queues behind a node's events have room (F8)."""
+"""How code waits until the queues that a node's events fill have room (F8)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the code of a node writes to its outputs during a firing (F3, P8, T1, T2)."""
+"""Values that the code of a node writes to its outputs during a firing (F3, P8, T1, T2)."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def write(worker: RunningNode, position: int, value: object, activity: int | Non
     """A node's code writes to an output: it leaves when the firing is over (F3).
 
     Raises:
-      UsageError: outside a firing (also in a slot handler, F9), or twice in one firing.
+      UsageError: outside a firing, which includes slot handlers (F9), or twice in one firing.
     """
     if worker.busy not in ("firing", "ending") and (worker.region is None or not worker.region.is_sending(worker)):
         called = worker.busy == "call" or (not worker.busy and worker.stamp is not None)  # the fast path of calls
@@ -105,10 +105,10 @@ def write(worker: RunningNode, position: int, value: object, activity: int | Non
 def entry_of(
     worker: RunningNode, position: int, written: list[Any] | None, value: Any, activity: int | None, stamp: float | None
 ) -> tuple[Any, int | None, float | None] | None:
-    """What a node's code writes to an output of which nothing was written before; None is silence (T2).
+    """Return the entry of a first value for an output; None is silence (T2).
 
     Raises:
-      UsageError: something was.
+      UsageError: a value was written before.
     """
     if value is None:
         return None

@@ -161,7 +161,7 @@ def taking(edge: AnyEdge) -> Action:
 
 
 def full_edges(worker: RunningNode) -> list[EventEdge]:
-    """Return the full queues behind its events."""
+    """Return the full queues that its events fill."""
     return [edge for edge in worker.event_edges() if edge.full]
 
 

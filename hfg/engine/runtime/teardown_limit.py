@@ -1,4 +1,4 @@
-"""How long each step at the end of a run may take (X3), also when the user wants to leave at once."""
+"""How long each step at the end of a run may take (X3), even if the user wants to leave now."""
 
 from __future__ import annotations
 
