@@ -7,9 +7,15 @@ Depends on `sockets` and the studio's messages.
 from __future__ import annotations
 
 import json
+import os
+import shlex
+import shutil
+import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping
 from itertools import count
+from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
@@ -120,16 +126,76 @@ def set(  # noqa: A001 - the verb
 def edit(
     run: _RunNeeded,
     commands: Annotated[
-        str, typer.Argument(help='JSON, as in \'[{"do": "Disable", "path": "camera"}]\'; "-": standard input')
-    ],
+        str | None,
+        typer.Argument(
+            help='JSON, as in \'[{"do": "Disable", "path": "camera"}]\'; "-": standard input; default: $EDITOR'
+        ),
+    ] = None,
 ) -> int:
-    """Edit a graph that is running in another process, by commands as hfg.commands writes them. All or none."""
+    """Edit a graph that is running in another process, by commands as hfg.commands writes them. All or none.
+
+    Without commands, $EDITOR opens the graph as a file, and the difference is carried out when the editor ends.
+    """
+    if commands is None:
+        return _edit_text(run)
     text = sys.stdin.read() if commands == "-" else commands
     try:
         listed = json.loads(text)
     except ValueError as error:
         raise TargetError(f"the commands are not JSON: {error}; hfg.commands.encode writes them") from None
     return _steer("edit", run, {"t": "edit", "commands": listed})
+
+
+_SAID: Final = "#! "
+
+
+def _edit_text(run: str) -> int:
+    """Let a person edit the graph as a file, until it is accepted, or nothing is changed any more."""
+    there = find(run)
+    if len(there) > 1:
+        return which("edit", there)
+    with _Steered(there[0].name) as steered:
+        file = steered.ask("ask", what="file", args={})
+    before = shown = file["text"]
+    refused = ""
+    with tempfile.TemporaryDirectory(prefix="hfg-edit-") as folder:
+        path = Path(folder) / file["name"]
+        while True:
+            path.write_text("".join(f"{_SAID}{line}\n" for line in refused.splitlines()) + shown)
+            _run_editor(path)
+            after = "".join(line for line in path.read_text().splitlines(keepends=True) if not line.startswith(_SAID))
+            if refused and after == shown:
+                raise TargetError(f"nothing was edited, because the file was left as it was refused: {refused}")
+            if after == before:
+                show.write("nothing was edited\n")
+                return 0
+            try:
+                return _amend(there[0].name, before, after)
+            except TargetError as error:
+                refused, shown = str(error), after
+
+
+def _amend(name: str, before: str, after: str) -> int:
+    """Carry out what differs; the connection is a new one, because a person takes minutes."""
+    with _Steered(name) as steered:
+        commands = steered.ask("ask", what="amended", args={"before": before, "after": after})["commands"]
+        if commands:
+            steered.ask("edit", commands=commands)
+    show.write(f"edited, by {len(commands)} command{'' if len(commands) == 1 else 's'}\n")
+    return 0
+
+
+def _run_editor(path: Path) -> None:
+    """Open a file and wait until the person has left it."""
+    editor = os.environ.get("VISUAL") or os.environ.get("EDITOR") or shutil.which("vi")
+    if not editor:
+        raise TargetError("no editor is set: EDITOR=nano hfg edit ..., or give the commands as JSON")
+    try:
+        code = subprocess.run([*shlex.split(editor), str(path)], check=False).returncode
+    except OSError as error:
+        raise TargetError(f'the editor "{editor}" cannot be started: {error}; set EDITOR to another') from None
+    if code != 0:
+        raise TargetError(f'nothing was edited, because the editor "{editor}" ended with code {code}')
 
 
 def undo(run: _Run = None) -> int:

@@ -23,7 +23,7 @@ from hfg.files.allowed import Allowed
 from hfg.files.boxes import FileBox, file_box_type
 from hfg.files.findings import Findings, graph_path
 from hfg.files.missing import MissingNode, missing_node
-from hfg.files.reading import Read, read_file
+from hfg.files.reading import Read, read_bytes, read_file
 from hfg.graph.editing.boxes import box_type
 from hfg.graph.editing.document import NODE_OPTIONS, PORT_KINDS, BoxDocument, Document, NodeDocument
 from hfg.graph.editing.from_document import Builder, Key
@@ -34,7 +34,7 @@ from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.naming import suggest
 from hfg.nodetypes.node import Node
 
-__all__ = ["box_of_file", "build", "load", "modules_of"]
+__all__ = ["box_of_file", "build", "build_text", "load", "modules_of"]
 
 _LOGGER: Final = Log("hfg.files")
 _current: ContextVar[_Loading | None] = ContextVar("hfg.files.loading", default=None)
@@ -66,6 +66,25 @@ def build(document: Document, beside: Path, allow: Iterable[str] = ()) -> Graph:
     """
     loading = _Loading(beside, allow)
     return loading.graph(Read(document, {}, str(beside)), beside.resolve())
+
+
+def build_text(text: str, file: Path, allow: Iterable[str] = ()) -> Graph:
+    """Make a graph of the text of a graph file that is not on the disk.
+
+    Args:
+      text: what the file would contain.
+      file: the path that the file would have; problems name it.
+      allow: packages whose node types may be imported.
+
+    Raises:
+      FileError: it cannot be made; `problems` lists everything, with lines.
+    """
+    loading = _Loading(file, allow)
+    read = read_bytes(text.encode(), file.name, loading.findings)
+    loading.findings.reject(f"{file.name} cannot be loaded")
+    if read is None:
+        raise EngineInternalError(f"{file.name} was not read, and no problem was reported")
+    return loading.graph(read, file.resolve())
 
 
 def box_of_file(path: Path) -> type[FileBox]:

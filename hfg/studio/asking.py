@@ -5,12 +5,16 @@ from __future__ import annotations
 import asyncio
 import re
 from collections.abc import Awaitable, Callable, Mapping
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import msgspec
 
+from hfg.base.token import Token
 from hfg.graph.structure.level import inside, level_of
 from hfg.graph.structure.paths import node_at, parameter_at
+from hfg.studio.amending import amended, text_of_graph
+from hfg.studio.annotating import Annotate, annotate
+from hfg.studio.capturing import level_as_svg, value_as_file
 from hfg.studio.choosing import edge_options, gates, operators, promotions, stops
 from hfg.studio.clipboard import pasted, text_of_nodes
 from hfg.studio.following import Following
@@ -76,6 +80,16 @@ class _Said(_Args, frozen=True):
     text: str
 
 
+class _ValueFile(_Args, frozen=True):
+    path: str
+    kind: Literal["csv", "npy"]
+
+
+class _Level(_Args, frozen=True):
+    level: str = ""
+    view: Literal["", "activity", "mission", "all"] = ""
+
+
 class _Paths(_Args, frozen=True):
     paths: list[str]
 
@@ -103,16 +117,29 @@ async def _type(host: Following, args: _Type) -> Any:
 
 
 async def _value(host: Following, args: _Path) -> Any:
+    return await asyncio.to_thread(shown_value, await _next_token(host, args.path))
+
+
+async def _value_file(host: Following, args: _ValueFile) -> Any:
+    token = await _next_token(host, args.path)
+    return await asyncio.to_thread(value_as_file, token.value, args.path, args.kind)
+
+
+async def _svg(host: Following, args: _Level) -> Any:
+    return await asyncio.to_thread(level_as_svg, host.graph, args.level, args.view)
+
+
+async def _next_token(host: Following, path: str) -> Token[Any]:
+    """Wait until something passes a place of the run."""
     run = host.steering.run
     if run is None:
         raise Refused("state", "the graph does not run, so nothing passes there")
-    with run.tap(place_at(host.graph, args.path), size=1) as tap:
+    with run.tap(place_at(host.graph, path), size=1) as tap:
         try:
             async with asyncio.timeout(_PATIENCE_S):
-                token = await anext(tap)
+                return await anext(tap)
         except (TimeoutError, StopAsyncIteration):
-            raise Refused("state", f'nothing has passed "{args.path}" within {_PATIENCE_S:g} s') from None
-    return await asyncio.to_thread(shown_value, token)
+            raise Refused("state", f'nothing has passed "{path}" within {_PATIENCE_S:g} s') from None
 
 
 _PATIENCE_S: Final = 2.0
@@ -182,11 +209,30 @@ async def _ways_out(host: Following, args: _Path) -> Any:
     return ways_out(host.graph, args.path)
 
 
-_ANSWERS: Final[Mapping[str, tuple[type[_Args], Callable[[Following, Any], Awaitable[Any]]]]] = {
+async def _annotate(host: Following, args: Annotate) -> Any:
+    return annotate(host.graph, args)
+
+
+class _Amended(_Args, frozen=True):
+    before: str
+    after: str
+
+
+async def _file(host: Following, args: _Nothing) -> Any:
+    return text_of_graph(host.project)
+
+
+async def _amended(host: Following, args: _Amended) -> Any:
+    return await asyncio.to_thread(amended, host.project, args.before, args.after)
+
+
+_ANSWERS: Final[Mapping[str, tuple[type[msgspec.Struct], Callable[[Following, Any], Awaitable[Any]]]]] = {
     "targets": (_Targets, _targets),
     "search": (_Search, _search),
     "type": (_Type, _type),
     "value": (_Path, _value),
+    "value_file": (_ValueFile, _value_file),
+    "svg": (_Level, _svg),
     "node": (_Path, _node),
     "read_text": (_Said, _read_text),
     "folder": (_Path, _folder),
@@ -200,5 +246,8 @@ _ANSWERS: Final[Mapping[str, tuple[type[_Args], Callable[[Following, Any], Await
     "edge": (_Path, _edge),
     "operators": (_Nothing, _operators),
     "stops": (_Path, _stops),
+    "file": (_Nothing, _file),
+    "amended": (_Amended, _amended),
+    "annotate": (Annotate, _annotate),
     "ways_out": (_Path, _ways_out),
 }

@@ -28,6 +28,7 @@ from hfg.panels import Call, Change
 from hfg.ports import Port
 from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS, SUBGRAPH_EVENTS, SUBGRAPH_SLOTS
 from hfg.ports.specs import REQUIRED, ParameterSpec
+from hfg.studio.annotating import annotations_of
 from hfg.studio.offering import arguments_of, offers
 from hfg.studio.records import (
     ActionRecord,
@@ -61,6 +62,7 @@ def describe_graph(graph: Graph) -> Records:
         tables["ports"][port.name] = OwnPortRecord(port.name, kind, _type_text(port.type))
     for level in root.walk():
         _describe_level(level, tables)
+    tables["annotations"] = dict(annotations_of(graph))
     return tables
 
 

@@ -14,6 +14,7 @@ from hfg.errors import HfgError
 from hfg.graph import Graph
 from hfg.graph.editing.changes import Change, NotesChange, ParameterChange
 from hfg.nodetypes.node import Node
+from hfg.studio.annotating import annotations_of
 from hfg.studio.describing import changed_record, describe_graph
 from hfg.studio.failing import problem_of_run, problems_of_check
 from hfg.studio.history import Attribution
@@ -110,7 +111,8 @@ class Following:
             if path in before:
                 nodes[path] = changed_record(self.graph, before[path])
         nodes = self.steering.shown(nodes)
-        self.tell(self.tables.replace({"nodes": nodes, "studio": self._singles()}, by, text))
+        noted = annotations_of(self.graph)
+        self.tell(self.tables.replace({"nodes": nodes, "annotations": noted, "studio": self._singles()}, by, text))
         self.layouts_wanted()
 
     def _singles(self) -> dict[str, Any]:

@@ -179,4 +179,18 @@ def type_of_reference(reference: str, allow: Iterable[str]) -> TypeRecord:
         {"kind": what, "name": one.name, "type": one.type, "doc": one.doc, "optional": str(one.optional)}
         for what, one in described.ports()
     ]
-    return msgspec.structs.replace(record, ports=ports)
+    return msgspec.structs.replace(record, ports=ports, example=_example(described))
+
+
+def _example(one: TypeDescription) -> str:
+    """Return code that adds a node of a type and leads its ports to others."""
+    needed = ", ".join(f"{each.name}=..." for each in one.parameters if each.required)
+    name = one.name if one.name != one.title else f"{one.name}_1"
+    lines = [
+        f"from {one.module} import {one.title.partition('.')[0]}",
+        "",
+        f"{name} = graph.add({one.title}({needed}))",
+    ]
+    lines += [f'graph.connect("before.out", {name}.{each.name})' for each in one.inputs[:1]]
+    lines += [f'graph.connect({name}.{each.name}, "after.value")' for each in (*one.outputs, *one.events)[:1]]
+    return "\n".join(lines)

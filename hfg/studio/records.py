@@ -11,6 +11,7 @@ import msgspec
 
 __all__ = [
     "ActionRecord",
+    "AnnotationRecord",
     "BreakpointRecord",
     "EdgeRecord",
     "FileRecord",
@@ -111,6 +112,24 @@ class EdgeRecord(msgspec.Struct, frozen=True):
     back: bool
 
 
+class AnnotationRecord(msgspec.Struct, frozen=True):
+    """A note on the canvas, or a frame around nodes.
+
+    Attributes:
+      level: path of the subgraph that it lies on.
+      at, size: where a note lies; a frame is where its nodes are.
+      members: paths of the nodes in a frame.
+    """
+
+    level: str
+    name: str
+    kind: str
+    text: str
+    at: tuple[float, float]
+    size: tuple[float, float]
+    members: list[str]
+
+
 class GateRecord(msgspec.Struct, frozen=True):
     """A gate: `target` rests while `by` is inactive."""
 
@@ -162,7 +181,12 @@ class ActionRecord(msgspec.Struct, frozen=True):
 
 
 class TypeRecord(msgspec.Struct, frozen=True):
-    """A node type; `docs` are of its ports by "kind/name", `ports` only of a type that was asked for by itself."""
+    """A node type.
+
+    Attributes:
+      docs: of its ports by "kind/name".
+      ports: only of a type that was asked for by itself; so is `example`, lines of code that use it.
+    """
 
     reference: str
     title: str
@@ -176,6 +200,7 @@ class TypeRecord(msgspec.Struct, frozen=True):
     ports: list[dict[str, str]] = []
     views: list[ViewRecord] = []
     actions: list[ActionRecord] = []
+    example: str = ""
 
 
 class ProblemRecord(msgspec.Struct, frozen=True):

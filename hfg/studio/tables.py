@@ -19,7 +19,19 @@ _KEPT: Final = 1000
 
 _KEPT_BYTES: Final = 8 << 20
 
-NAMES: Final = ("nodes", "edges", "gates", "groups", "ports", "types", "layouts", "problems", "breakpoints", "studio")
+NAMES: Final = (
+    "nodes",
+    "edges",
+    "gates",
+    "groups",
+    "ports",
+    "types",
+    "annotations",
+    "layouts",
+    "problems",
+    "breakpoints",
+    "studio",
+)
 
 
 class Tables:

@@ -7,6 +7,7 @@ from typing import Final
 
 from hfg.errors import shown
 from hfg.graph import commands as c
+from hfg.studio.annotating import FRAME, KINDS
 
 __all__ = ["in_words"]
 
@@ -43,10 +44,20 @@ _WORDS: Final[Mapping[type[c.Command], str]] = {
 """What a command does, with its fields; those whose words depend on a value, and verbs of one path, are not here."""
 
 
+def _noted(path: str, name: str, *, removed: bool) -> str:
+    if name == "position":
+        return f"place {path}"
+    if name == FRAME:
+        return f"take {path} out of a frame" if removed else f"put {path} into a frame"
+    if name.partition(" ")[0] in KINDS:
+        return f"{'remove' if removed else 'write'} {name}"
+    return f"note {name} of {path or 'the graph'}"
+
+
 def _said(command: c.Command) -> str:
     match command:
         case c.Note(path=path, name=name):
-            return f"place {path}" if name == "position" else f"note {name} of {path or 'the graph'}"
+            return _noted(path, name, removed=command.value is None)
         case c.Promote(path=path, inner=inner, promoted=promoted):
             return f"let {path} stand for {inner}" if promoted else f"let {path} no longer stand for {inner}"
         case c.MakeActive(source=source, target=target, active=active):

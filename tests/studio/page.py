@@ -157,7 +157,9 @@ class Page:
 
     def agrees(self) -> bool:
         """Whether its replica is what the graph is."""
-        known = {name: self.tables[name] for name in ("nodes", "edges", "gates", "groups", "ports", "types")}
+        known = {
+            name: self.tables[name] for name in ("nodes", "edges", "gates", "groups", "ports", "types", "annotations")
+        }
         return bool(known == tables_of(self.studio.graph))
 
 

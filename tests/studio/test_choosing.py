@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import ast
+import base64
 from typing import Any
 
+import numpy as np
 import pytest
 
 import hfg
+from hfg.errors import HfgError
+from hfg.studio.capturing import value_as_file
 from tests.studio.page import Page, live, studio_of
 from tests.studio.stories.graphs import Drive, mission, workshop
 
@@ -119,3 +124,25 @@ def test_a_condition_is_refused_at_a_node_and_the_breakpoint_that_was_there_stay
         assert list(page.tables["breakpoints"]) == ["check"]
 
     live(main)
+
+
+def test_the_preview_of_a_type_has_ports_and_an_example_that_is_code() -> None:
+    async def main() -> None:
+        page = Page(studio_of(mission())).join()
+        for reference in ("hfg.nodes.flow:SampleAndHold", "tests.studio.stories.graphs:scaled"):
+            shown = await page.value("type", reference=reference)
+            assert shown["ports"]
+            adds = ast.parse(shown["example"]).body[1]
+            assert "graph.add(" in ast.unparse(adds)
+
+    live(main)
+
+
+def test_values_that_a_file_cannot_hold_are_refused_with_what_can_be_done() -> None:
+    as_table = value_as_file([{"x": 1, "y": "a"}, {"x": 2, "z": "b"}], "a.out", "csv")
+    assert as_table["name"] == "a.out.csv"
+    assert base64.b64decode(as_table["base64"]).decode().splitlines() == ["x,y,z", "1,a,", "2,,b"]
+    with pytest.raises(HfgError, match="this is dict; save it as CSV"):
+        value_as_file({"x": 1}, "a.out", "npy")
+    with pytest.raises(HfgError, match=r"this array has 3 \(2 x 2 x 2\); save it as NPY"):
+        value_as_file(np.zeros((2, 2, 2)), "a.out", "csv")

@@ -7,6 +7,7 @@ import contextlib
 import json
 import shutil
 import socket
+import sys
 import tempfile
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from pathlib import Path
@@ -255,6 +256,109 @@ def test_edit_carries_commands_out_or_none(capfd: pytest.CaptureFixture[str]) ->
     said = capfd.readouterr().err
     assert 'no node "nobody"' in said
     assert "the commands are not JSON" in said
+
+
+# --- the graph in an editor ---
+
+
+@pytest.fixture
+def editor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Path]:
+    """Let an editor be a program that does something with `text`; the path is where it keeps all that it was shown."""
+
+    def made(does: str) -> Path:
+        program, shown = tmp_path / "editor.py", tmp_path / "shown.txt"
+        program.write_text(
+            "import pathlib, sys\n"
+            "path = pathlib.Path(sys.argv[1])\n"
+            "text = path.read_text()\n"
+            f"open({str(shown)!r}, 'a').write(text + '---')\n"
+            f"{does}\n"
+            "path.write_text(text)\n"
+        )
+        monkeypatch.delenv("VISUAL", raising=False)
+        monkeypatch.setenv("EDITOR", f"{sys.executable} {program}")
+        return shown
+
+    return made
+
+
+FACTOR = "text = text.replace('test_studio:scaled\\n', 'test_studio:scaled\\n    parameters:\\n      factor: 7\\n')"
+
+
+@pytest.mark.rule("R4")
+def test_what_one_changes_in_the_editor_is_one_step_of_the_history(
+    editor: Callable[[str], Path], capfd: pytest.CaptureFixture[str]
+) -> None:
+    editor(FACTOR + "; text = text.replace('  - clock.out -> count.call\\n', '')")
+
+    async def test(run: hfg.Run) -> None:
+        assert await hfg_command("edit", "ticking") == 0
+        assert run.graph["scaled"].factor == 7
+        assert list(run.graph.edges) == []
+        assert await hfg_command("undo") == 0
+        assert run.graph["scaled"].factor == 2
+        assert [edge.label for edge in run.graph.edges] == ["clock.out -> count.call"]
+
+    steered(test)
+    assert "edited, by 2 commands" in capfd.readouterr().out
+
+
+def test_a_mistake_opens_the_editor_again_with_its_line_and_nothing_is_edited_meanwhile(
+    editor: Callable[[str], Path],
+) -> None:
+    shown = editor(
+        "wrong = 'clock.nix' in text\n"
+        "text = text.replace('clock.nix', 'clock.out') if wrong else text.replace('clock.out', 'clock.nix')\n"
+        "if wrong: " + FACTOR
+    )
+
+    async def test(run: hfg.Run) -> None:
+        assert await hfg_command("edit", "ticking") == 0
+        assert run.graph["scaled"].factor == 7
+
+    steered(test)
+    first, second, _ = shown.read_text().split("---")
+    assert "#!" not in first
+    assert second.startswith('#! ticking.hfg.yaml:11: "clock.nix -> count.call": there is no "clock.nix"')
+
+
+@pytest.mark.rule("R4")
+def test_what_others_edit_meanwhile_stays(editor: Callable[[str], Path]) -> None:
+    command = [sys.executable, "-m", "hfg", "set", "ticking", "scaled.factor=5"]
+    editor(
+        f"import subprocess; subprocess.run({command!r}, check=True)\n"
+        "text = text.replace('  - clock.out -> count.call\\n', '')"
+    )
+
+    async def test(run: hfg.Run) -> None:
+        assert await hfg_command("edit", "ticking") == 0
+        assert list(run.graph.edges) == []
+        assert run.graph["scaled"].factor == 5
+
+    steered(test)
+
+
+def test_an_editor_that_changes_nothing_or_fails_edits_nothing(
+    editor: Callable[[str], Path], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    editor("pass")
+
+    async def test(run: hfg.Run) -> None:
+        assert await hfg_command("edit", "ticking") == 0
+        editor("sys.exit(3)")
+        assert await hfg_command("edit", "ticking") == 2
+        editor("text = text.replace('clock.out', 'clock.nix')")
+        assert await hfg_command("edit", "ticking") == 2
+        monkeypatch.setenv("EDITOR", "no-such-editor")
+        assert await hfg_command("edit", "ticking") == 2
+        assert len(list(run.graph.edges)) == 1
+
+    steered(test)
+    said = capfd.readouterr()
+    assert "nothing was edited\n" in said.out
+    assert "ended with code 3" in said.err
+    assert "left as it was refused" in said.err
+    assert 'the editor "no-such-editor" cannot be started' in said.err
 
 
 # --- frames ---

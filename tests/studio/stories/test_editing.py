@@ -30,6 +30,24 @@ def test_a_node_is_added_where_one_clicks_twice(story: Story) -> None:
     story.moves_on("store")
 
 
+def test_the_palette_shows_what_a_type_is_before_one_adds_it(story: Story) -> None:
+    story.start()
+    story.page.mouse.dblclick(*story.empty_place())
+    story.page.keyboard.type("multiply a number")
+    row = story.page.locator("[id='row-tests.studio.stories.graphs:scaled']")
+    row.hover(position={"x": 8, "y": 8})
+    row.hover(position={"x": 40, "y": 12})
+    preview = story.page.get_by_role("region", name="About the node type")
+    expect(preview).to_contain_text("Multiply a number.")
+    expect(preview).to_contain_text("factor")
+    expect(preview.locator(".example")).to_contain_text("graph.add(scaled())")
+    before = set(story.graph.nodes)
+    story.press("Enter")
+    story.bench.until(lambda: len(story.graph.nodes) == len(before) + 1)
+    (added,) = set(story.graph.nodes) - before
+    assert story.bench.call(lambda: story.graph[added]._type.qualname) == "scaled"
+
+
 def test_a_deleted_node_comes_back_by_undo_with_its_edges(story: Story) -> None:
     story.start()
     before = edges_of(story)

@@ -4,6 +4,7 @@ import { useMemo, useRef } from "react";
 import { change, layoutKey, useStudio } from "../state/studio";
 import { enter } from "../state/actions";
 import { AskedWires } from "./AskedWires";
+import { Annotations } from "./Annotations";
 import { FarOverlay } from "./FarOverlay";
 import { MovedWires } from "./MovedWires";
 import { NodeView } from "./NodeView";
@@ -33,6 +34,7 @@ function Inner() {
   const wiring = useStudio((s) => s.wire !== null);
   const spots = useMemo(() => (layout ? spotsOf(layout) : new Map()), [layout]);
   const { nodes, moved, onNodesChange, onDragStart, onDrag, onDragStop } = useNodes(layout);
+  const hands = useMemo(() => new Map(nodes.filter((one) => moved.has(one.id)).map((one) => [one.id, one.position])), [nodes, moved]);
   const view = useView(root, layout);
   const events = useCanvasEvents(spots, layout);
   const classes = [view.level, wiring && "wiring", layout?.view === "activity" && "view-activity"];
@@ -52,7 +54,7 @@ function Inner() {
           if (node.data.box.kind === "subgraph") enter(node.id);
           else change({ renaming: node.id });
         }}
-        onPaneClick={() => change({ selectedEdge: null, menu: null })}
+        onPaneClick={() => change({ selectedEdge: null, annotation: null, menu: null })}
         onMove={view.onMove}
         onMoveEnd={view.onMoveEnd}
         minZoom={0.05}
@@ -74,12 +76,16 @@ function Inner() {
         <Background variant={BackgroundVariant.Dots} gap={16} size={1} color="var(--grid)" />
         {layout && (
           <ViewportPortal>
+            <div className="frames">
+              <Annotations layout={layout} kind="frame" moved={hands} />
+            </div>
             <div className="under">
               <Wires layout={layout} moved={moved} />
               <AskedWires layout={layout} spots={spots} />
               <MovedWires layout={layout} nodes={nodes} moved={moved} />
             </div>
             <Tags layout={layout} />
+            <Annotations layout={layout} kind="note" moved={hands} />
           </ViewportPortal>
         )}
         {layout && view.level === "far" && <FarOverlay layout={layout} />}

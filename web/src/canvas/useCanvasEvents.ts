@@ -2,6 +2,7 @@ import { useReactFlow } from "@xyflow/react";
 import { type MouseEvent, type PointerEvent, useEffect } from "react";
 import type { LayoutRecord } from "../protocol/types";
 import { change, studio } from "../state/studio";
+import { addAnnotation } from "../state/annotating";
 import { select } from "../state/actions";
 import { hideTip, showTip } from "./tips";
 import { beginWire, dropWire, endWire, nearest, openPalette, restOn, type Spot } from "./wiring";
@@ -33,12 +34,19 @@ export function useCanvasEvents(spots: Map<string, Spot>, layout: LayoutRecord |
       const screen = { x: box.left + box.width / 2 - 324, y: box.top + 120 };
       openPalette("", screen, flow.screenToFlowPosition({ x: box.left + box.width / 2, y: box.top + box.height / 2 }));
     };
+    const note = () => {
+      const box = document.getElementById("canvas")?.getBoundingClientRect() ?? new DOMRect();
+      const place = flow.screenToFlowPosition({ x: box.left + box.width / 2 - 100, y: box.top + 96 });
+      void addAnnotation({ kind: "note", at: [place.x, place.y] });
+    };
     window.addEventListener("hfg-add", add);
+    window.addEventListener("hfg-note", note);
     window.addEventListener("pointermove", move);
     window.addEventListener("pointerup", up);
     window.addEventListener("keydown", leave, true);
     return () => {
       window.removeEventListener("hfg-add", add);
+      window.removeEventListener("hfg-note", note);
       window.removeEventListener("pointermove", move);
       window.removeEventListener("pointerup", up);
       window.removeEventListener("keydown", leave, true);

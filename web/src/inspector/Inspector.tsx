@@ -7,6 +7,7 @@ import { Measured } from "./Measured";
 import { NodeHead } from "./NodeHead";
 import { Parameters } from "./Parameters";
 import { Placement } from "./Placement";
+import { Several } from "./Several";
 import { Ports } from "./Ports";
 import { Promotions } from "./Promotions";
 import { StopEditor } from "./StopEditor";
@@ -27,9 +28,7 @@ export function Inspector() {
         ) : edge !== null ? (
           <EdgeFacts edge={edge} />
         ) : several > 1 ? (
-          <div className="who">
-            <h2 className="n">{several} nodes</h2>
-          </div>
+          <Several count={several} />
         ) : (
           <GraphFacts />
         )}

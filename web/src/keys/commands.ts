@@ -3,6 +3,10 @@ import { change, studio } from "../state/studio";
 import { seek, stepTo } from "../live/replay";
 import { isRecording } from "../state/looking";
 import * as act from "../state/actions";
+import { addAnnotation, removeAnnotation } from "../state/annotating";
+import type { Alignment } from "../state/aligning";
+import { align, distribute, selectedBoxes } from "../state/arranging";
+import { savePng, saveSvg } from "../state/capturing";
 import { record, useWindow } from "../timeline/store";
 
 /** A thing that one can do: in the palette of commands, on keys, in menus. One list, so that no key is a secret. */
@@ -17,9 +21,26 @@ export interface Doing {
 const none = () => (act.chosen().length === 0 ? "Choose a node first." : "");
 const noEdge = () => (studio().selectedEdge === null ? "Choose an edge first." : "");
 const first = () => act.chosen()[0] ?? "";
-const nothing = () => (none() && noEdge() ? "Choose a node or an edge first." : "");
+const several = (least: number) => () => (selectedBoxes().length < least ? `Choose ${least} nodes or more first.` : "");
+const nothing = () => (none() && noEdge() && studio().annotation === null ? "Choose a node or an edge first." : "");
 const edits = (more: () => string = () => "") => () => act.locked() || more();
 const view = (one: View) => () => act.choose(one);
+
+export const ALIGNMENTS: [Alignment, string][] = [
+  ["left", "Align left sides"],
+  ["centre", "Align centres"],
+  ["right", "Align right sides"],
+  ["top", "Align upper sides"],
+  ["middle", "Align middles"],
+  ["bottom", "Align lower sides"],
+];
+
+/** A frame goes, what is in it stays. */
+function remove(): void {
+  const { annotation } = studio();
+  if (annotation !== null) void removeAnnotation(annotation);
+  else void act.remove(act.chosen());
+}
 
 async function copy(): Promise<void> {
   await navigator.clipboard.writeText(await act.copyAsText(act.chosen()));
@@ -47,9 +68,9 @@ function followOrNot(): void {
 const replays = () => act.unsteerable() || (isRecording(studio().tables.studio.run) ? "" : "Only a recording goes back.");
 
 function leaveSomething(): void {
-  const { menu, popover, acting, selectedEdge, selection, panel, level } = studio();
+  const { menu, popover, acting, selectedEdge, annotation, selection, panel, level } = studio();
   if (menu || popover || acting) change({ menu: null, popover: null, palette: null, acting: null });
-  else if (selection.size > 0 || selectedEdge) act.select([]);
+  else if (selection.size > 0 || selectedEdge || annotation) act.select([]);
   else if (panel) change({ panel: null });
   else if (level !== "") act.leave();
 }
@@ -72,13 +93,18 @@ export const DOINGS: Doing[] = [
   { name: "Double the selection", keys: "Ctrl+D", off: edits(none), run: () => void twice() },
   { name: "Make a subgraph of the selection", keys: "Ctrl+G", off: edits(none), run: () => void act.enclose(act.chosen()) },
   { name: "Dissolve the subgraph", keys: "Ctrl+Shift+G", off: edits(none), run: () => void act.dissolve(act.chosen()) },
-  { name: "Delete", keys: "Delete", off: edits(nothing), run: () => void act.remove(act.chosen()) },
+  { name: "Delete", keys: "Delete", off: edits(nothing), run: remove },
   { name: "Delete and join the wires", keys: "Ctrl+Delete", off: edits(none), run: () => void act.dissolveNode(first()) },
   { name: "Rename", keys: "F2", off: edits(none), run: () => change({ renaming: first() }) },
   { name: "Enable or disable", keys: "E", off: edits(none), run: () => void act.toggleEnabled(act.chosen()) },
   { name: "Make the edge active, or passive", keys: "A", off: edits(noEdge), run: () => void act.makeActive(studio().selectedEdge!) },
   { name: "Connect: choose a port, then the other", keys: "C", off: edits(none), run: () => change({ popover: "connect" }) },
   { name: "Pin a probe", keys: "P", off: noEdge, run: () => act.pin(studio().selectedEdge!) },
+  { name: "Write a note", keys: "N", off: edits(), run: () => window.dispatchEvent(new CustomEvent("hfg-note")) },
+  { name: "Frame the selection", keys: "Ctrl+J", off: edits(none), run: () => void addAnnotation({ kind: "frame", paths: act.chosen() }) },
+  ...ALIGNMENTS.map(([way, name]) => ({ name, keys: "", off: edits(several(2)), run: () => align(way) })),
+  { name: "Distribute from left to right", keys: "", off: edits(several(3)), run: () => distribute("x") },
+  { name: "Distribute from top to bottom", keys: "", off: edits(several(3)), run: () => distribute("y") },
   { name: "Lay out all", keys: "", off: edits(), run: () => void act.arrange(null) },
   { name: "Lay out the selection", keys: "", off: edits(none), run: () => void act.arrange(act.chosen()) },
   { name: "Go into the subgraph", keys: "Enter", off: none, run: () => studio().tables.nodes[first()]?.subgraph && act.enter(first()) },
@@ -97,6 +123,8 @@ export const DOINGS: Doing[] = [
   { name: "Actions of nodes", keys: "X", off: edits(), run: () => change({ popover: "actions" }) },
   { name: "Inspector", keys: "I", run: () => change({ side: !studio().side }) },
   { name: "Light or dark", keys: "", run: () => change({ theme: studio().theme === "dark" ? "light" : "dark" }) },
+  { name: "Save a picture of this level as SVG", keys: "", run: () => void saveSvg() },
+  { name: "Save a picture of this level as PNG", keys: "", run: () => void savePng() },
   { name: "Save", keys: "Ctrl+S", off: edits(), run: () => void act.save() },
   { name: "Open or save as", keys: "Ctrl+O", off: edits(), run: () => change({ popover: "open" }) },
   { name: "Keys", keys: "?", run: () => change({ popover: "keys" }) },

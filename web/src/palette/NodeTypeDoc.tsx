@@ -51,6 +51,12 @@ export function NodeTypeDoc({ row, port }: { row: FoundRow; port: string }) {
             ))}
           </dl>
           {type.doc.length > type.summary.length + 1 && <p style={{ whiteSpace: "pre-wrap", marginTop: 8 }}>{(type.doc.startsWith(type.summary) ? type.doc.slice(type.summary.length) : type.doc).trim()}</p>}
+          {type.example && (
+            <>
+              <h5>In code</h5>
+              <pre className="mono example">{type.example}</pre>
+            </>
+          )}
         </>
       )}
     </>

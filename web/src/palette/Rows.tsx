@@ -15,6 +15,13 @@ export function Rows({ found, words, index, choose, add }: Props) {
   useEffect(() => {
     list.current?.querySelector(".sel")?.scrollIntoView({ block: "nearest" });
   }, [index]);
+  const mouse = useRef("");
+  /** Rows that scroll by under a mouse that rests are not chosen by it. */
+  const hover = (x: number, y: number, at: number) => {
+    const place = `${x} ${y}`;
+    if (mouse.current !== "" && mouse.current !== place && at !== index) choose(at);
+    mouse.current = place;
+  };
   const slow = useSlow(found === null);
   const rows = found?.rows ?? [];
   if (found && rows.length === 0) {
@@ -41,6 +48,7 @@ export function Rows({ found, words, index, choose, add }: Props) {
           role="option"
           aria-selected={at === index}
           className={`${at === index ? "sel" : ""}${row.fit === "refused" ? " no" : ""}${at === firstRefused ? " first-no" : ""}`}
+          onPointerMove={(event) => hover(event.clientX, event.clientY, at)}
           onPointerDown={() => choose(at)}
           onDoubleClick={() => add(row)}
         >

@@ -1,6 +1,7 @@
 import { useEffect, useState } from "react";
 import type { Data, Value } from "../protocol/types";
 import { pin } from "../state/actions";
+import { saveValue } from "../state/capturing";
 import { socket } from "../state/link";
 import { valueSeen } from "../state/looking";
 import { Icon } from "../ui/Icon";
@@ -24,8 +25,27 @@ export function Probe({ path }: { path: string }) {
         <span className="sp" />
         <span className="r num">{value ? `${value.kind === "number" ? value.summary : rate(value.rate_hz)}${shape}` : ""}</span>
       </header>
+      {value && value.kind !== "none" && value.kind !== "marker" && <Saving path={path} kind={value.kind} />}
       {value ? <Body path={path} value={value} /> : <div className="text">{why || "Nothing was sent yet."}</div>}
     </section>
+  );
+}
+
+/** The next value that passes, as a file. */
+function Saving({ path, kind }: { path: string; kind: Value["kind"] }) {
+  const arrays = kind === "array" || kind === "image" || kind === "number";
+  return (
+    <div className="saving">
+      <span className="muted">Save the next value as</span>
+      <button type="button" className="btn small" aria-label={`Save a value of ${path} as CSV`} onClick={() => void saveValue(path, "csv")}>
+        CSV
+      </button>
+      {arrays && (
+        <button type="button" className="btn small" aria-label={`Save a value of ${path} as NPY`} onClick={() => void saveValue(path, "npy")}>
+          NPY
+        </button>
+      )}
+    </div>
   );
 }
 

@@ -52,6 +52,17 @@ export interface GateRecord {
   level: string;
 }
 
+/** A note on the canvas, or a frame around nodes. */
+export interface AnnotationRecord {
+  level: string;
+  name: string;
+  kind: "note" | "frame";
+  text: string;
+  at: [number, number];
+  size: [number, number];
+  members: string[];
+}
+
 export interface GroupRecord {
   name: string;
   threads: number | null;
@@ -121,6 +132,7 @@ export interface TypeRecord {
   ports?: { kind: PortKind; name: string; type: string }[];
   views: ViewRecord[];
   actions: ActionRecord[];
+  example?: string;
 }
 
 /** A drawing in the coordinates of its world: shapes by kind, those before below those behind. */
@@ -280,6 +292,7 @@ export interface Tables {
   groups: Record<string, GroupRecord>;
   ports: Record<string, PortRecord>;
   types: Record<string, TypeRecord>;
+  annotations: Record<string, AnnotationRecord>;
   layouts: Record<string, LayoutRecord>;
   problems: Record<string, ProblemRecord>;
   breakpoints: Record<string, BreakpointRecord>;

@@ -74,7 +74,7 @@ export function choose(view: View): void {
 }
 
 export function select(paths: Iterable<string>): void {
-  change({ selection: new Set(paths), selectedEdge: null });
+  change({ selection: new Set(paths), selectedEdge: null, annotation: null });
 }
 
 /** Goes to where a node is, and selects it. */

@@ -7,6 +7,7 @@ export const EMPTY: Tables = {
   groups: {},
   ports: {},
   types: {},
+  annotations: {},
   layouts: {},
   problems: {},
   breakpoints: {},

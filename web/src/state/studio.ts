@@ -60,6 +60,9 @@ export interface Studio {
   views: Readonly<Record<string, View>>;
   selection: ReadonlySet<string>;
   selectedEdge: string | null;
+  /** The note or frame that is selected, and the one that is being written. */
+  annotation: string | null;
+  writing: string | null;
   activity: Activity;
   age: 0 | 1 | 3;
   ageSeconds: number;
@@ -108,6 +111,8 @@ export const useStudio = create<Studio>()(() => ({
   views: {},
   selection: new Set<string>(),
   selectedEdge: null,
+  annotation: null,
+  writing: null,
   activity: { since: {}, ways: new Set<string>() },
   age: 0,
   ageSeconds: 0,

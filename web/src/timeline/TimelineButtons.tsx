@@ -1,5 +1,6 @@
 import { isRecording } from "../state/looking";
 import { useStudio } from "../state/studio";
+import { saveAs } from "../state/capturing";
 import { Icon } from "../ui/Icon";
 import { record, useWindow } from "./store";
 
@@ -63,10 +64,5 @@ function savePerfetto(): void {
     tid: lanes.indexOf(group) + 1,
   }));
   const names = lanes.map((name, index) => ({ name: "thread_name", ph: "M", pid: 1, tid: index + 1, args: { name } }));
-  const blob = new Blob([JSON.stringify({ traceEvents: [...names, ...events] })], { type: "application/json" });
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(blob);
-  link.download = "timeline.json";
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  saveAs("timeline.json", new Blob([JSON.stringify({ traceEvents: [...names, ...events] })], { type: "application/json" }));
 }
