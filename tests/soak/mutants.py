@@ -209,8 +209,8 @@ MUTANTS: Final = (
         "an END that was promised before the head finds nobody",
         "F4",
         "region",
-        "elif self.ending:  # the END",
-        "elif False:  # the END",
+        "elif self.ending:  # an END",
+        "elif False:  # an END",
         _LOOKING,
     ),
     _fused(

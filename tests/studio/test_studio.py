@@ -236,7 +236,7 @@ def test_drags_of_two_pages_stay_apart() -> None:
         ({"do": "Remove", "path": "nobody"}, "refused", 'no node "nobody"'),
         ({"do": "SetParameter", "path": "scaled.factor", "value": -1}, "refused", "must be >= 0, got -1"),
         ({"do": "Add", "type": "antigravity:fly", "path": "x"}, "refused", "these commands are refused"),
-        ({"do": "Dance", "path": "x"}, "refused", "no list of commands"),
+        ({"do": "Dance", "path": "x"}, "refused", "not a list of commands"),
         ({"do": "Connect", "source": "source.out", "target": "scaled.value"}, "refused", "already"),
     ],
 )

@@ -71,9 +71,9 @@ def test_a_pushed_robot_is_elsewhere_and_its_wheels_have_not_noticed(arena: Aren
     arena.ask_for("Push a robot")
     ahead = arena.page.get_by_label("ahead", exact=True)
     ahead.fill("-0.8")
+    before = arena.bench.call(lambda: (arena.body.x, arena.body.y, arena.body.odometry))
     ahead.press("Enter")
     places: list[tuple[float, float]] = []
-    before = arena.bench.call(lambda: (arena.body.x, arena.body.y, arena.body.odometry))
     arena.page.get_by_role("dialog", name="Push a robot").wait_for(state="hidden")
 
     def is_pushed() -> bool:
