@@ -146,10 +146,12 @@ def idle_again(worker: RunningNode, *, asked: bool = False) -> None:
         worker.allow(UNREADY)
     calls = bool(worker.calls) and worker.blocked < NO_CALLS
     if worker.is_next:
+        left = worker.fireable or calls  # of the wave that has enabled it: that comes before all else (R2)
+        if left and worker.queued:  # a reset came before the call for which it stands there: that goes first (F9)
+            return
         worker.clear_next()
-        if worker.fireable or calls:  # what is left of the wave that has enabled it comes before all else (R2)
-            if not worker.queued:
-                worker.enqueue_next()
+        if left:
+            worker.enqueue_next()
             return
     if worker.fireable:
         worker.enqueue()
