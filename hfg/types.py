@@ -542,11 +542,12 @@ def _make_checker(hint: Any) -> Callable[[Any], bool]:
 
 def _array_checker(dtype: Any, layouts: tuple[Shape, ...]) -> Callable[[Any], bool]:
     dtypes = typing.get_args(dtype) if _is_union(dtype) else (np.generic if dtype is Any else dtype,)
-    return lambda value: (
-        isinstance(value, np.ndarray)
-        and issubclass(value.dtype.type, dtypes)
-        and all(layout.accepts(value.shape) for layout in layouts)
-    )
+
+    @functools.lru_cache(maxsize=64)  # cameras send arrays of the same few shapes, again and again
+    def fits(shape: tuple[int, ...]) -> bool:
+        return all(layout.accepts(shape) for layout in layouts)
+
+    return lambda value: isinstance(value, np.ndarray) and issubclass(value.dtype.type, dtypes) and fits(value.shape)
 
 
 def _is_plain_class(hint: Any) -> bool:
