@@ -44,7 +44,7 @@ class Edge:
         group, and the group works first in, first out.
       while_active: the slot at its end accepts signals only while its node is active (T4).
       ended: the consumer has taken END from it and no longer waits for it (F4).
-      handler: the handler of the slot at its end, which takes the value, if a call needs nothing else; None: the
+      handler: the plain handler of the slot at its end, which takes the value, or the token if `takes_token`; None: the
         interpreter makes the call.
       waits: the worker whose output barrier counts an unprocessed token of this edge: the source, or the head of the
         source's region. Without meaning for event edges.
@@ -75,6 +75,7 @@ class Edge:
         "sequential",
         "source",
         "source_port",
+        "takes_token",
         "tap",
         "target",
         "target_kind",
@@ -110,6 +111,7 @@ class Edge:
         self.source_port: Any = None
         self.target_port: Any = None
         self.handler: Callable[[Any], Any] | None = None
+        self.takes_token = False
         self.tap: Callable[[Token[Any]], None] | None = None
 
     def join(self, source: Any, target: Any) -> None:
@@ -124,12 +126,19 @@ class Edge:
         self.position = position
         self.mandatory = mandatory
 
-    def enter_slot(self, name: str, handler: Callable[[Any], Any] | None, while_active: bool) -> None:
-        """Make a slot of the target the edge's end."""
+    def enter_slot(self, name: str, handler: Callable[[Any], Any] | None, spec: Any) -> None:
+        """Make a slot of the target the edge's end.
+
+        Args:
+          name: of the slot.
+          handler: takes the value, or the token; None: the slot has none, or an async one.
+          spec: how the slot is declared; None: it belongs to every node, or to a subgraph.
+        """
         self.target_kind = "slot"
         self.port_name = name
         self.handler = handler
-        self.while_active = while_active
+        self.takes_token = spec is not None and spec.token
+        self.while_active = spec is not None and spec.while_active
 
     def stand_for(
         self, segments: tuple[Any, ...], source_port: Any, target_port: Any, via: tuple[Any, ...], options: Any

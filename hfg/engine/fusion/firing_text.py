@@ -43,9 +43,16 @@ class FiringText(Facts):
     def _stops_if(self, asked: str, call: str, p: int) -> None:
         """Others move before member p; they may raise a flag, or run a wave of their own, which flags mean then."""
         self.say(f"if {asked}:")
-        self.say(f"    if {call}: return region.stop({p}, locals())")
+        self.indent += 1
+        self.say(f"if {call}: return region.stop({p}, locals())")
+        self._register()
+        self.indent -= 1
+
+    def _register(self) -> None:
+        """From here on flags let this wave forget; one that was raised just before did not."""
         if self.forgets:
-            self.say("    flags.forget = forget; forget()")
+            self.say("flags.forget = forget")
+            self.say("if flags: forget()")
 
     def _slot_call(self, k: int) -> None:
         """A slot that an output feeds: a marker is processed at once, the handler is not called (T4, F6)."""

@@ -125,7 +125,7 @@ def may_be_called(worker: RunningNode) -> bool:
         type(edge) is SyncEdge
         and edge.depth_first
         and edge.handler is not None
-        and not edge.while_active
+        and not (edge.while_active or edge.takes_token)
         and not worker.unfit
         and isinstance(worker.group.policy, Fifo)
         and not _looks(worker)

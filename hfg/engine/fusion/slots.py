@@ -49,12 +49,12 @@ def calls_step(worker: RunningNode) -> Step:
 
 
 def _call_step(worker: RunningNode, edge: SyncEdge | EventEdge) -> Step:
-    """One edge into one slot, whose handler takes the value."""
+    """One edge into one slot with a plain handler."""
     if edge.handler is None:
         return firing.step
     if isinstance(edge, SyncEdge):
         return _token_step(worker, edge)
-    return firing.step if edge.while_active else _signal_step(worker.group, worker.core)
+    return firing.step if edge.while_active or edge.takes_token else _signal_step(worker.group, worker.core)
 
 
 def _signal_step(group: Group, core: Core) -> Step:
@@ -128,7 +128,7 @@ def _token_step(worker: RunningNode, edge: SyncEdge) -> Step:
     lies: Any = edge  # what lies there is taken without a call
     held = (edge,) if edge.sequential else ()
     pipelined = () if held else (edge,)
-    while_active = edge.while_active
+    while_active, takes_token = edge.while_active, edge.takes_token
 
     def step(worker: RunningNode) -> None:
         if not calls or worker.blocked >= NO_CALLS or worker.busy:
@@ -145,7 +145,7 @@ def _token_step(worker: RunningNode, edge: SyncEdge) -> Step:
             core.running_node = worker
             worker.stamp = token.stamp
             try:
-                result = handler(token.value)
+                result = handler(token if takes_token else token.value)
             except Exception as error:
                 return _failed(worker, edge, error)
             if result is not None and type(result) is CoroutineType:

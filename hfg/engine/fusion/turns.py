@@ -22,7 +22,7 @@ from typing import Any
 
 from hfg.activity.rules import leaving
 from hfg.base.token import NO_MESSAGE, Token
-from hfg.engine.fusion.wave_state import WaveState
+from hfg.engine.fusion.wave_state import Turnstile, WaveState
 from hfg.engine.model.running_node import NO_CALLS, RunningNode
 from hfg.engine.model.tap import tap_inside
 from hfg.engine.rules.firing import receive_modifiers
@@ -30,12 +30,6 @@ from hfg.engine.rules.putting import bring_activity, put
 from hfg.engine.rules.sending import activity_left, announce, send_automatic, sent
 
 __all__ = ["Turns"]
-
-
-class _Turnstile:
-    """Stands in the run queue after the nodes that have their turns during a wave; no other node passes it."""
-
-    calls = ()
 
 
 class Turns(WaveState):
@@ -51,42 +45,50 @@ class Turns(WaveState):
 
     def turns(self, p: int) -> bool:
         """Outsiders whose turns come right before member p have them; whether the wave is to stop there."""
-        keys = [key for _, key in self.schedule.between[p]]
-        return any(key in self.waiting and not self._turn(self.waiting.pop(key)) for key in keys)
+        waiting = self.waiting
+        for _, key in self.schedule.between[p]:  # noqa: SIM110 - a generator costs more than most of these turns
+            if key in waiting and not self._turn(waiting.pop(key)):
+                return True
+        return False
 
     def _turn(self, worker: RunningNode) -> bool:
         """It moves now, and all that follows from that over sequential edges; whether the wave may go on."""
         queue: Any = self.head.group.policy
-        turnstile = _Turnstile()
+        turnstile = self._turnstile
         queue.appendleft(turnstile)
-        queue.appendleft(worker)
-        if self._work_off(queue, turnstile):
+        if self._work_off(queue, turnstile, worker):
             return True
         while (one := queue.popleft()) is not turnstile:  # which come before all that the wave leaves to the queue
             self._first.append(one)
         return False
 
-    def _work_off(self, queue: Any, until: Any) -> bool:
-        """Let those move that stand before `until` in the run queue, and take that out; False: something came up."""
-        group, core, flags, outputs = self.head.group, self.core, self.flags, self.head.outputs
+    def _work_off(self, queue: Any, until: Any, one: Any) -> bool:
+        """Let `one` move, and all that stand before `until` in the run queue then, and take that out.
+
+        Returns:
+          Whether the wave may go on; otherwise something has come up, and `until` still stands in the queue.
+        """
+        head, core, flags = self.head, self.core, self.flags
+        group, outputs = head.group, head.outputs
         budget, ran_next = group.budget, core.ran_next
         group.set_budget(1)  # or calls in a row would run past the turnstile
         outputs.expect()  # the head has fired, and its wave is not over: what has left the region does not free it
         goes_on = True
-        while goes_on:
-            one = queue.popleft()
-            if one is until and not (one.calls and one.calls_before):
-                break
-            if type(one) is _Turnstile:  # of a wave in which this one is a turn, and which goes first
+        while one is not until or (one.calls and one.calls_before):
+            if type(one) is Turnstile:  # of a wave in which this one is a turn, and which goes first
                 queue.appendleft(one)
                 goes_on = False
                 break
-            one.step(one)
-            goes_on = not ((flags and core.ends_slice()) or self.called_off)
+            step = one.step  # calling it as a field would look it up the slow way
+            step(one)
+            if self.called_off or (flags and core.ends_slice()):
+                goes_on = False
+                break
+            one = queue.popleft()
         outputs.count(outputs.missing - 1)
         group.set_budget(budget)
         core.ran_next = ran_next  # these turns belong to the wave, and the pump has not counted them
-        core.running_node = self.head
+        core.running_node = head
         return goes_on
 
     # --- calls of members -------------------------------------------------------------------------------------------
@@ -112,7 +114,8 @@ class Turns(WaveState):
         worker = self.order[p]
         if not worker.fireable:
             self.expect(p)
-        if not self._work_off(self.head.group.policy, worker):
+        queue: Any = self.head.group.policy
+        if not self._work_off(queue, worker, queue.popleft()):
             return True
         worker.use_turn()
         return False

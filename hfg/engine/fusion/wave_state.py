@@ -15,9 +15,15 @@ from hfg.engine.rules import agenda
 from hfg.errors import EngineInternalError
 from hfg.ports.edges import EventEdge
 
-__all__ = ["WaveState"]
+__all__ = ["Turnstile", "WaveState"]
 
 _LONGEST_PUT_OFF = 255  # waves for which a region that cannot be armed does not ask again
+
+
+class Turnstile:
+    """Stands in the run queue after the nodes that have their turns during a wave; no other node passes it."""
+
+    calls = ()
 
 
 class WaveState:
@@ -49,6 +55,7 @@ class WaveState:
         self.border = [edge for out in schedule.outs for edge, _, to in out if to is None]
         self.activity_senders = [worker for worker in order if any(edge.active for edge in worker.all_out_edges())]
         self.waiting: dict[Key, RunningNode] = {}
+        self._turnstile = Turnstile()
         self._number_of = {edge: n for out in schedule.outs for n, (edge, _, to) in enumerate(out) if to is None}
         self._first: list[RunningNode] = []  # who goes before all that the wave leaves to the run queue
         self.armed = False

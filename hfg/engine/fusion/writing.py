@@ -150,12 +150,6 @@ class Writer(FiringText):
         """Whether a wave may begin although values are missing at the head; each later member then sees the silence."""
         return self.turns and not self.is_source and all(type(edge) is SyncEdge for edge in self.entries)
 
-    def _register(self) -> None:
-        """From here on flags let this wave forget; one that was raised just before did not."""
-        if self.forgets:
-            self.say("flags.forget = forget")
-            self.say("if flags: forget()")
-
     def _nonlocal(self) -> None:
         if self._kinds():
             self.say(f"nonlocal {', '.join(self._kinds())}")

@@ -116,7 +116,7 @@ class Vertex(Generic[NodeT]):
     wants_token: tuple[bool, ...] = ()
     mandatory_ports: tuple[str, ...] = ()
     handlers: dict[str, Any] = field(init=False)  # slot -> callable(token)
-    plain_handlers: dict[str, Any] = field(init=False)  # slot -> callable(value), if that is the same
+    plain_handlers: dict[str, Any] = field(init=False)  # slot -> callable(value or token), unless async
     iteration: Iteration[NodeT] | None = None  # its border, if it iterates (G4)
 
     # where it runs, and whether
@@ -273,7 +273,7 @@ class Vertex(Generic[NodeT]):
         if kind == "slot":
             self._find_handler(name)
             spec = self.type.slots.get(name) if self.type is not None and self.scope is None else None
-            edge.enter_slot(name, self.plain_handlers.get(name), spec is not None and spec.while_active)
+            edge.enter_slot(name, self.plain_handlers.get(name), spec)
             self.slot_edges += (edge,)
             return
         if kind == "parameter":
@@ -293,8 +293,8 @@ class Vertex(Generic[NodeT]):
         self.handlers[name] = self.node._slot_call(name)
         spec = self.type.slots[name]
         handler = self.node._handler(name)
-        if handler is not None and not spec.token and not inspect.iscoroutinefunction(handler):
-            self.plain_handlers[name] = handler if spec.takes_value else lambda _value: handler()
+        if handler is not None and not inspect.iscoroutinefunction(handler):
+            self.plain_handlers[name] = handler if spec.takes_value or spec.token else lambda _value: handler()
 
     def lead_out(self, edge: Edge, kind: str, name: str) -> None:
         """Connect an edge to an output, or to a parameter, whose output is made when it is first connected (P8)."""

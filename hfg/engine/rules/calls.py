@@ -48,18 +48,18 @@ def call(worker: RunningNode) -> None:
     elif edge.while_active and not worker.active:  # T4: it was about to be active, or it was when the token came
         finish_call(worker, "done")
     elif edge.handler is not None and not (worker.group.threaded or core.sharing is not None):
-        _call_at_once(worker, edge, token.value)
+        _call_at_once(worker, edge, token if edge.takes_token else token.value)
     else:
         _run_handler(worker, name, token)
 
 
-def _call_at_once(worker: RunningNode, edge: AnyEdge, value: object) -> None:
-    """Run a handler that takes the value, on the loop: what `_run_handler` does, with fewer steps."""
+def _call_at_once(worker: RunningNode, edge: AnyEdge, taken: object) -> None:
+    """Run a plain handler on the loop, with the value or token: what `_run_handler` does, with fewer steps."""
     core = worker.core
     derive_scopes(core)
     core.current = worker
     try:
-        result = edge.handler(value)  # type: ignore[misc]  # it has one
+        result = edge.handler(taken)  # type: ignore[misc]  # it has one
     except Exception as error:
         core.current = None
         core.rules.fail_call(worker, edge.port_name, error)
@@ -140,7 +140,8 @@ def finish_call(worker: RunningNode, outcome: CallOutcome) -> None:
     """The automatic events follow (A9), then the call is over: a sequential O->S token is processed (F6)."""
     core = worker.core
     derive_scopes(core)
-    send_automatic(worker)
+    if worker.events_due:
+        send_automatic(worker)
     if core.trace is not None:
         core.trace(CallEnded(core.now(), worker.path, worker.counts.calls, outcome))
     edge = worker.end_call()

@@ -27,19 +27,21 @@ def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
       edges: where they lay.
       drained: the edges whose tokens were drained, which was reported already (F12).
     """
-    stack: list[Any] = list(reversed(edges))
-    while stack:
-        edge = stack.pop()
-        if not edge.release():
-            continue
-        producer: RunningNode = edge.waits
-        core = producer.core
-        if core.trace is not None and edge not in drained:
-            core.trace(TokenProcessed(core.now(), edge.label))
-        if producer.outputs.arrive():
-            freed_by_that = outputs_free(producer)
-            if freed_by_that:
-                stack.extend(reversed(freed_by_that))
+    left: list[Any] | None = None  # which are to be released before the next of the edges
+    for edge in edges:
+        while True:
+            if edge.release():
+                producer: RunningNode = edge.waits
+                core = producer.core
+                if core.trace is not None and edge not in drained:
+                    core.trace(TokenProcessed(core.now(), edge.label))
+                if producer.outputs.arrive():
+                    freed_by_that = outputs_free(producer)
+                    if freed_by_that:
+                        left = [*(left or ()), *reversed(freed_by_that)]
+            if not left:
+                break
+            edge = left.pop()
 
 
 def make_room(edge: AnyEdge) -> None:
