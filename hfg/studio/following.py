@@ -42,6 +42,7 @@ class Following:
       turn: held during an edit, so that edits of pages, files and runs come one after the other.
       listeners: called with each event of the run; by topics.
       spans: when nodes were active.
+      is_described: the tables hold the graph, as they do from the first page that joins.
     """
 
     def __init__(self, project: Project, steering: Steering) -> None:
@@ -54,6 +55,7 @@ class Following:
         self.attribution = Attribution()
         self.listeners: set[Any] = set()
         self.spans = Spans()
+        self.is_described = False
         self._layouts = Layouts(self)
         self._dirty: set[str] = set()
         self._is_stale = False
@@ -83,6 +85,7 @@ class Following:
 
     def refresh_all(self, by: int = 0, text: str = "") -> None:
         """The graph may be another one: make all its records again."""
+        self.is_described = True
         self._is_stale = False
         self._dirty.clear()
         tables = describe_graph(self.graph)
@@ -145,7 +148,7 @@ class Following:
 
     def run_changed(self) -> None:
         """See `Follower`."""
-        if self.tables.of["studio"]:
+        if self.is_described:
             self.tell(self.tables.replace({"studio": self._singles(), "breakpoints": self.steering.breakpoints()}))
 
     def run_begins(self, active: Iterable[str], at: float) -> None:

@@ -109,6 +109,7 @@ class Steering:
         self._listener: Any = None
         self._offset = 0.0
         self._over = asyncio.Event()
+        self._step = asyncio.Lock()
 
     def follow(self, run: Run) -> None:
         """Follow a run that another program has begun, and that cannot be started here."""
@@ -226,19 +227,20 @@ class Steering:
         raise Refused("state", "only a recording has a cursor that can be moved, and this is a graph")
 
     async def step(self, path: str, *, back: bool = False) -> dict[str, Any]:
-        """One step of a node, or of all; return what moved."""
-        run = self._need()
+        """One step of a node, or of all, after those that were asked for before; return what moved."""
         if back:
             raise Refused("state", "only a recording goes back, and this is a graph")
-        if not run.paused:
-            raise Refused(
-                "state", "the run is not paused, and only a run that stands still makes steps; pause it first"
-            )
-        self._say(state="stepping")
-        try:
-            step = await run.step(path or None)
-        finally:
-            self._stepped(run)
+        async with self._step:
+            run = self._need()
+            if not run.paused:
+                raise Refused(
+                    "state", "the run is not paused, and only a run that stands still makes steps; pause it first"
+                )
+            self._say(state="stepping")
+            try:
+                step = await run.step(path or None)
+            finally:
+                self._stepped(run)
         return {"moved": list(step.moved), "why_not": step.why_not}
 
     def _stepped(self, run: Run) -> None:

@@ -151,7 +151,7 @@ class Studio(Following):
     def _join(self, viewer: Viewer, message: Join) -> None:
         missing = self.tables.since(message.rev) if message.boot == self.boot else None
         viewer.levels.add(("", ""))
-        if not self.tables.of["studio"]:
+        if not self.is_described:
             self.refresh_all()
         if missing is None:
             viewer.send(self.tables.snapshot())

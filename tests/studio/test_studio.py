@@ -100,6 +100,20 @@ def test_a_page_that_joins_gets_all_tables() -> None:
     live(main)
 
 
+def test_a_page_that_left_before_it_joined_takes_nothing_from_the_next() -> None:
+    async def main() -> None:
+        studio = studio_of(ticking())
+        Page(studio).cut()
+        waits = Page(studio)
+        await studio.steering.start(stay=True)
+        page = Page(studio).join()
+        assert page.agrees()
+        assert waits.join().agrees()
+        await studio.close()
+
+    live(main)
+
+
 def test_two_pages_see_an_edit_as_the_same_patch_before_it_is_acknowledged() -> None:
     async def main() -> None:
         studio = studio_of(doubling())
@@ -399,6 +413,36 @@ def test_a_paused_run_makes_steps() -> None:
         assert stuck["why_not"]
         await page.ask("proceed")
         assert page.run["state"] == "running"
+        await page.studio.close()
+
+    live(main)
+
+
+class Slowly(hfg.Node):
+    """Take its time."""
+
+    done = hfg.State(0)
+
+    @hfg.slot
+    async def work(self, number: int) -> None:
+        """Work."""
+        await asyncio.sleep(0)
+        self.done += number
+
+
+def test_whoever_asks_for_steps_faster_than_they_are_made_gets_all_of_them() -> None:
+    async def main() -> None:
+        graph = hfg.Graph("slow")
+        graph.add(Slowly(), name="slowly")
+        page = Page(studio_of(graph)).join()
+        await page.ask("start", stay=True)
+        await page.ask("pause")
+        for _ in range(3):
+            await page.ask("trigger", path="slowly.work", value=1)
+        steps = await asyncio.gather(*(page.ask("step", path=path) for path in ("", "slowly", "")))
+        assert [step["value"]["moved"] for step in steps] == [["slowly"]] * 3
+        assert graph["slowly"].done == 3
+        assert page.run["state"] == "paused"
         await page.studio.close()
 
     live(main)
