@@ -14,7 +14,7 @@ import { Toasts } from "./shell/Toasts";
 import { TopBar } from "./shell/TopBar";
 import { Stage } from "./stage/Stage";
 import { useOffers } from "./stage/offers";
-import { useStudio } from "./state/studio";
+import { keepTheme, useStudio } from "./state/studio";
 import { BottomPanel } from "./timeline/BottomPanel";
 import { applyTheme } from "./ui/colours";
 import { Guard } from "./ui/Guard";
@@ -30,7 +30,7 @@ export function App() {
   useFailures();
   useEffect(() => {
     applyTheme(theme);
-    localStorage.setItem("hfg-theme", theme);
+    keepTheme(theme);
   }, [theme]);
   const classes = ["frame", !side && "noside", staged && hasViews && !start && "staged", old && "old"].filter(Boolean).join(" ");
   return (

@@ -1,7 +1,7 @@
 import type { Fit, LayoutRecord, PortKind, Targets } from "../protocol/types";
 import { connect, disconnect, isSource, locked, question, reconnect, toast } from "../state/actions";
 import { edgeKey, endsOf, nodeOf } from "../state/paths";
-import { change, studio } from "../state/studio";
+import { change, studio, type WireDrag } from "../state/studio";
 
 export interface Spot {
   path: string;
@@ -133,17 +133,21 @@ export function endWire(): void {
 export const fitOf = (port: string | null): Fit | undefined =>
   port === null ? undefined : studio().wire?.targets?.ports[port];
 
+/** What a wire may lead to; who drops it at once may be faster than the studio. */
+const answerFor = (wire: WireDrag): Promise<Targets | null> =>
+  wire.targets ? Promise.resolve(wire.targets) : targetsOf(wire.from, wire.moving).catch(() => null);
+
 /** Drop: connect, move, cut, or choose what lies between. */
 export async function dropWire(place: { x: number; y: number }): Promise<void> {
   const wire = studio().wire;
   endWire();
   if (!wire) return;
-  const fit = wire.over === null ? undefined : wire.targets?.ports[wire.over];
   if (wire.over === null) {
     if (wire.moving !== "") await disconnect(wire.moving);
     else openPalette(wire.from, wire.screen, place);
     return;
   }
+  const fit = (await answerFor(wire))?.ports[wire.over];
   if (fit === undefined) return;
   if (fit.fit === "refused") {
     openPalette(wire.from, wire.screen, place);

@@ -35,17 +35,24 @@ interface Props {
 export function Field({ id, type, value, locked, set, anew }: Props) {
   const [refusal, setRefusal] = useState("");
   const [refused, setRefused] = useState<Data>(null);
+  /** What the person has set, until the studio has answered: who goes on at once goes on from there. */
+  const [asked, setAsked] = useState<{ value: Data } | null>(null);
   const old = useStudio((s) => s.age === 3);
-  const changed = JSON.stringify(value) !== JSON.stringify(type.default);
+  const shown = asked ? asked.value : value;
+  const changed = JSON.stringify(shown) !== JSON.stringify(type.default);
   const off = locked !== "" || type.read_only || old || lockedNow() !== "";
   const send = (next: Data, gesture: string) => {
-    set(next, gesture).then(
-      () => setRefusal(""),
-      (error: Error) => {
-        setRefusal(error instanceof Refusal ? `${error.reject.message}` : error.message);
-        setRefused(next);
-      },
-    );
+    const mine = { value: next };
+    setAsked(mine);
+    void set(next, gesture)
+      .then(
+        () => setRefusal(""),
+        (error: Error) => {
+          setRefusal(error instanceof Refusal ? `${error.reject.message}` : error.message);
+          setRefused(next);
+        },
+      )
+      .then(() => setAsked((now) => (now === mine ? null : now)));
   };
   const Widget = widgetFor(type);
   const help = [type.doc, locked, changed && `usually ${short(type.default)}; double click resets it`];
@@ -55,7 +62,7 @@ export function Field({ id, type, value, locked, set, anew }: Props) {
         <label htmlFor={id} onDoubleClick={() => changed && !off && send(type.default, newGesture())}>
           {type.name.replaceAll("_", " ")}
         </label>
-        <Widget id={id} type={type} value={value} off={off} bad={refusal !== ""} set={send} />
+        <Widget id={id} type={type} value={shown} off={off} bad={refusal !== ""} set={send} />
       </div>
       {refusal !== "" && (
         <p className="par-note" role="alert">

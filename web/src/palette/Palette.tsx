@@ -22,6 +22,8 @@ function PaletteAtPlace({ at }: { at: PaletteAt }) {
   const [found, setFound] = useState<Found | null>(null);
   const [answered, setAnswered] = useState<string | null>(null);
   const [index, setIndex] = useState(0);
+  /** Words for which somebody has pressed Enter before their answer came: its first row is added once it does. */
+  const entered = useRef<{ words: string; connected: boolean } | null>(null);
   const search = useRef({ busy: false, next: null as { words: string; port: string } | null });
   const sends = useStudio((s) => s.tables.nodes[nodeOf(port)]?.ports.find((one) => one.path === port)?.type ?? "");
 
@@ -53,12 +55,21 @@ function PaletteAtPlace({ at }: { at: PaletteAt }) {
     close();
     void addNode(one, at.place, connected && one.fit !== "refused" ? port : "");
   };
+  const enter = (connected: boolean) => {
+    if (answered === words) add(row, connected);
+    else entered.current = { words, connected };
+  };
+  useEffect(() => {
+    if (entered.current === null || entered.current.words !== answered) return;
+    add(rows[0], entered.current.connected);
+    entered.current = null;
+  }, [answered]);
   const key = (event: KeyboardEvent) => {
     event.stopPropagation();
     if (event.key === "Escape") close();
     if (event.key === "ArrowDown") setIndex(Math.min(rows.length - 1, index + 1));
     if (event.key === "ArrowUp") setIndex(Math.max(0, index - 1));
-    if (event.key === "Enter") add(row, !event.altKey);
+    if (event.key === "Enter") enter(!event.altKey);
     if (["ArrowDown", "ArrowUp", "Enter", "Tab"].includes(event.key)) event.preventDefault();
   };
   const left = Math.max(52, Math.min(at.screen.x, window.innerWidth - WIDTH - 12));
@@ -77,7 +88,10 @@ function PaletteAtPlace({ at }: { at: PaletteAt }) {
             aria-expanded="true"
             aria-controls="palette-rows"
             aria-activedescendant={row ? `row-${row.reference}` : undefined}
-            onChange={(event) => setWords(event.target.value)}
+            onChange={(event) => {
+              entered.current = null;
+              setWords(event.target.value);
+            }}
           />
           {port !== "" && (
             <span className="chipf">

@@ -26,6 +26,8 @@ interface Waiting {
 export interface Listener {
   hello(hello: Hello): void;
   message(message: FromStudio): void;
+  /** Something has arrived, whatever it is. */
+  heard(): void;
   opened(): void;
   closed(code: number, reason: string): void;
   /** Boot and revision of the state that the page has, or null. */
@@ -53,11 +55,26 @@ export class Socket {
 
   connect(): void {
     clearTimeout(this.timer);
+    this.leave();
     const socket = new WebSocket(this.address, "hfg.studio.v1");
     this.socket = socket;
     socket.binaryType = "arraybuffer";
     socket.onmessage = (event) => this.heard(event.data as string | ArrayBuffer);
     socket.onclose = (event) => this.closed(event);
+  }
+
+  /** What another connection says afterwards is for nobody. */
+  private leave(): void {
+    if (this.socket === null) return;
+    this.socket.onmessage = this.socket.onclose = null;
+    this.socket.close();
+    this.forget();
+  }
+
+  private forget(): void {
+    this.greeted = false;
+    for (const one of this.waiting.values()) one.reject(new Error("The studio went away before it answered."));
+    this.waiting.clear();
   }
 
   /** Before the studio has greeted nothing may be said. */
@@ -98,6 +115,7 @@ export class Socket {
 
   private heard(data: string | ArrayBuffer): void {
     this.lastWord = performance.now();
+    this.listener.heard();
     if (typeof data !== "string") {
       const frame = readFrame(data);
       this.deliver(frame.sub, frame.seq, frame.time, null, frame);
@@ -154,9 +172,7 @@ export class Socket {
   }
 
   private closed(event: CloseEvent): void {
-    this.greeted = false;
-    for (const one of this.waiting.values()) one.reject(new Error("The studio went away before it answered."));
-    this.waiting.clear();
+    this.forget();
     this.listener.closed(event.code, event.reason);
     if (event.code === 4401 || event.code === 1008) return;
     this.timer = window.setTimeout(() => this.connect(), RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)]);

@@ -1,4 +1,4 @@
-import { dropToast } from "../state/actions";
+import { dropToast, holdToast } from "../state/actions";
 import { socket } from "../state/link";
 import { elapsed } from "../state/looking";
 import { useStudio, type Toast } from "../state/studio";
@@ -18,8 +18,10 @@ export function Toasts() {
 }
 
 function OneToast({ toast }: { toast: Toast }) {
+  const hold = (held: boolean) => () => holdToast(toast.id, held);
+  const held = { onPointerEnter: hold(true), onPointerLeave: hold(false), onFocus: hold(true), onBlur: hold(false) };
   return (
-    <div className={`pop toast grows ${toast.kind === "bad" ? "bad" : ""}`} role={toast.kind === "bad" ? "alert" : undefined}>
+    <div className={`pop toast grows ${toast.kind === "bad" ? "bad" : ""}`} role={toast.kind === "bad" ? "alert" : undefined} {...held}>
       {toast.kind !== "plain" && (
         <span style={{ color: toast.kind === "bad" ? "var(--bad)" : "var(--warn)" }}>
           <Icon name="error" />

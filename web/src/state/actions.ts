@@ -14,10 +14,21 @@ export function toast(text: string, more: Partial<Omit<Toast, "id" | "text">> = 
   const one: Toast = { id: ++toasts, kind: "plain", title: "", ...more, text };
   const others = studio().toasts.filter((other) => other.text !== text).slice(-2);
   change({ toasts: [...others, one] });
-  if (lasts > 0) setTimeout(() => dropToast(one.id), lasts);
+  if (lasts > 0) endings.set(one.id, window.setTimeout(() => dropToast(one.id), lasts));
+}
+
+const endings = new Map<number, number>();
+const AFTERWARDS_MS = 2000;
+
+/** A sentence stays while the mouse or the focus is on it: nobody loses the button that is about to be pressed. */
+export function holdToast(id: number, held: boolean): void {
+  if (!endings.has(id)) return;
+  clearTimeout(endings.get(id));
+  if (!held) endings.set(id, window.setTimeout(() => dropToast(id), AFTERWARDS_MS));
 }
 
 export function dropToast(id: number): void {
+  endings.delete(id);
   change({ toasts: studio().toasts.filter((one) => one.id !== id) });
 }
 
@@ -268,8 +279,15 @@ export function pauseOrGo(): void {
   else void tell("start", { stay: true });
 }
 
+let steps = 0;
+/** Steps that are asked for at once: a key that is held asks no faster than they are made. */
+const MOST_STEPS = 2;
+
 export async function step(path: string): Promise<void> {
+  if (steps >= MOST_STEPS) return;
+  steps++;
   const answer = await ask<{ moved: string[]; why_not?: string }>({ t: "step", path });
+  steps--;
   if (answer?.why_not) toast(answer.why_not);
 }
 

@@ -10,6 +10,9 @@ export const socket = new Socket(address(), {
     if (hello.name) document.title = `${hello.name} · hfg studio`;
   },
   message: heard,
+  heard() {
+    if (studio().age > 0 && studio().phase === "open") change({ age: 0, ageSeconds: 0 });
+  },
   opened() {
     change({ phase: "open", age: 0, ageSeconds: 0, wire: null });
     opened = [];
@@ -71,9 +74,15 @@ export function showLevel(): void {
   for (const one of opened.splice(0, opened.length - KEPT_LEVELS)) socket.send({ t: "level", ...one, open: false });
 }
 
+const LOOK_MS = 250;
+
 /** Old data looks old: after one second without a word the dot is grey, after three the picture is. */
 export function watchAge(): void {
+  let looked = performance.now();
   setInterval(() => {
+    const late = performance.now() - looked > 4 * LOOK_MS;
+    looked = performance.now();
+    if (late) return; // this page has stood still, not the studio: its words are read first
     const state = studio();
     const running = ["running", "starting"].includes(state.tables.studio.run?.state ?? "");
     const since = state.phase === "closed" ? state.closedAt : socket.lastWord;
@@ -82,7 +91,7 @@ export function watchAge(): void {
     const age = seconds >= 3 ? 3 : seconds >= 1 ? 1 : 0;
     const ageSeconds = Math.floor(seconds);
     if (age !== state.age || (age > 0 && ageSeconds !== state.ageSeconds)) change({ age, ageSeconds });
-  }, 250);
+  }, LOOK_MS);
 }
 
 export { layoutKey };

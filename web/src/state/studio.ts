@@ -93,10 +93,17 @@ export interface Studio {
 
 const media = window.matchMedia("(prefers-color-scheme: dark)");
 
+const usualTheme = (): "light" | "dark" => (media.matches ? "dark" : "light");
+
 function firstTheme(): "light" | "dark" {
   const kept = localStorage.getItem("hfg-theme");
-  if (kept === "light" || kept === "dark") return kept;
-  return media.matches ? "dark" : "light";
+  return kept === "light" || kept === "dark" ? kept : usualTheme();
+}
+
+/** Only another theme than the system's is a choice. */
+export function keepTheme(theme: "light" | "dark"): void {
+  if (theme === usualTheme()) localStorage.removeItem("hfg-theme");
+  else localStorage.setItem("hfg-theme", theme);
 }
 
 export const useStudio = create<Studio>()(() => ({
