@@ -21,13 +21,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from benchmarks.browser import CHROMIUM, Looker, StudioProcess, browsers, percentile, resident_mb
+from benchmarks.browser import Looker, percentile, resident_mb
 from benchmarks.crowd import build
 from benchmarks.goals import Goal, Side
 from benchmarks.measure import Case
 from hfg.studio.project import Project
 from hfg.studio.serving import Server, StudioDoor
 from hfg.studio.studio import Studio
+from tools.browser import CHROMIUM, StudioProcess, browsers
 
 DISTRIBUTIONS = ("hfg", "playwright")
 RUNS = 3
@@ -270,25 +271,17 @@ MOMENTS: dict[str, tuple[Measured, float]] = {
 def moment(name: str, times: int) -> dict[str, float]:
     """The 95th percentile of a moment, its median and its longest."""
     measured, _ = MOMENTS[name]
-    studio = StudioProcess(CROWD, "--run")
-    try:
-        with browsers() as browser:
-            looker = Looker(browser, studio.address, calm=measured is not way)
-            looker.page.wait_for_timeout(3000)
-            took = measured(looker, times)
-    finally:
-        studio.close()
+    with StudioProcess(CROWD, "--run") as studio, browsers() as browser:
+        looker = Looker(browser, studio.address, calm=measured is not way)
+        looker.page.wait_for_timeout(3000)
+        took = measured(looker, times)
     return {"p95": percentile(took), "p50": percentile(took, 0.5), "max": max(took)}
 
 
 def ready(times: int) -> dict[str, float]:
     """The address is opened: nodes are painted, and live. In a studio that has just begun, then once more."""
-    studio = StudioProcess(CROWD, "--run")
-    try:
-        with browsers() as browser:
-            first, *others = [_opened(browser, studio) for _ in range(times)]
-    finally:
-        studio.close()
+    with StudioProcess(CROWD, "--run") as studio, browsers() as browser:
+        first, *others = [_opened(browser, studio) for _ in range(times)]
     return {"first": first, "later": percentile(others, 0.5)}
 
 
@@ -300,15 +293,11 @@ def _opened(browser: Any, studio: StudioProcess) -> float:
 
 def frames(seconds: int) -> dict[str, float]:
     """Frames while one pans and zooms; the figure is the slower of both, in milliseconds a frame."""
-    studio = StudioProcess(CROWD, "--run")
-    try:
-        with browsers() as browser:
-            looker = Looker(browser, studio.address)
-            looker.page.wait_for_timeout(5000)
-            pan, longest = looker.frames(lambda: _pan(looker, seconds))
-            zoom, longest_zoom = looker.frames(lambda: _zoom(looker, seconds))
-    finally:
-        studio.close()
+    with StudioProcess(CROWD, "--run") as studio, browsers() as browser:
+        looker = Looker(browser, studio.address)
+        looker.page.wait_for_timeout(5000)
+        pan, longest = looker.frames(lambda: _pan(looker, seconds))
+        zoom, longest_zoom = looker.frames(lambda: _zoom(looker, seconds))
     return {
         "ms": 1000 / min(pan, zoom),
         "pan_fps": pan,
@@ -338,38 +327,32 @@ def _zoom(looker: Looker, seconds: int) -> None:
 
 def alone(seconds: int) -> dict[str, float]:
     """What the page works while nobody touches it, and whether anything moves by itself."""
-    studio = StudioProcess(CROWD, "--run")
-    try:
-        with browsers() as browser:
-            looker = Looker(browser, studio.address)
-            looker.page.wait_for_timeout(15_000)  # the timeline is full
-            bars = looker.page.locator("[data-node] canvas").count()
-            looker.page.evaluate(
-                """() => { window.shift = 0; new PerformanceObserver(list => {
-                  for (const one of list.getEntries()) shift += one.value;
-                }).observe({type: "layout-shift"}); }"""
-            )
-            busy, processor = looker.busy(seconds)
-            shift = looker.page.evaluate("window.shift")
-    finally:
-        studio.close()
+    with StudioProcess(CROWD, "--run") as studio, browsers() as browser:
+        looker = Looker(browser, studio.address)
+        looker.page.wait_for_timeout(15_000)  # the timeline is full
+        bars = looker.page.locator("[data-node] canvas").count()
+        looker.page.evaluate(
+            """() => { window.shift = 0; new PerformanceObserver(list => {
+              for (const one of list.getEntries()) shift += one.value;
+            }).observe({type: "layout-shift"}); }"""
+        )
+        busy, processor = looker.busy(seconds)
+        shift = looker.page.evaluate("window.shift")
     return {"busy": busy, "processor": processor, "bars": bars, "layout_shift": shift}
 
 
 def restart(times: int) -> dict[str, float]:
     """The studio is killed and started again: from when it serves until the page is live."""
-    studio = StudioProcess(CROWD)
     took = []
-    try:
-        with browsers() as browser:
-            looker = Looker(browser, studio.address)
-            for _ in range(times):
-                looker.page.wait_for_timeout(1000)
-                looker.page.evaluate("() => { window.back = becomes(false).then(() => becomes(true)); }")
-                served = studio.kill_and_restart()
-                took.append(float(looker.page.evaluate("window.back")) - 1000 * served)
-    finally:
-        studio.close()
+    with StudioProcess(CROWD) as studio, browsers() as browser:
+        looker = Looker(browser, studio.address)
+        for _ in range(times):
+            looker.page.wait_for_timeout(1000)
+            looker.page.evaluate("() => { window.back = becomes(false).then(() => becomes(true)); }")
+            studio.kill()
+            studio.start()
+            served = time.time()
+            took.append(float(looker.page.evaluate("window.back")) - 1000 * served)
     return {"longest": max(took), "p50": percentile(took, 0.5)}
 
 

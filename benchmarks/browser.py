@@ -1,34 +1,22 @@
-"""A studio in a process of its own, and its page in Chromium, with stopwatches in the page.
+"""Stopwatches in the page of a studio.
 
 A stopwatch runs from the browser's stamp of what the person did until a frame that shows the consequence is painted.
 """
 
 from __future__ import annotations
 
-import os
-import re
-import shutil
-import signal
-import subprocess
-import sys
-import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.measure import ROOT
+from tools.browser import WINDOW, Person
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, CDPSession, Locator, Page
+    from playwright.sync_api import Browser, CDPSession
 
-__all__ = ["CHROMIUM", "Looker", "StudioProcess", "browsers", "percentile", "resident_mb"]
+__all__ = ["Looker", "percentile", "resident_mb"]
 
-CHROMIUM = next(
-    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), ""
-)
-FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync"]
 PATIENCE_MS = 60_000
 
 STOPWATCH = """
@@ -74,111 +62,29 @@ window.ready = becomes(true);
 """
 
 
-class StudioProcess:
-    """`hfg studio` in a process of its own.
+class Looker(Person):
+    """A person at the page, with stopwatches.
 
     Attributes:
-      address: of the page, with its token.
+      ready_ms: from opening the address to painted nodes and a live connection.
     """
-
-    def __init__(self, *arguments: str) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="hfg-bench-")  # of its journal
-        self._command = [sys.executable, "-m", "hfg", "studio", "--no-browser", *arguments]
-        self._begin()
-
-    def _begin(self) -> None:
-        paths = f"{ROOT}{os.pathsep}{ROOT / 'transports'}"
-        self.process = subprocess.Popen(
-            self._command,
-            cwd=self._folder.name,
-            stdout=subprocess.PIPE,
-            text=True,
-            env=os.environ | {"PYTHONPATH": paths},
-        )
-        assert self.process.stdout is not None
-        found = next((one for line in self.process.stdout if (one := re.search(r"http://\S+", line))), None)
-        if found is None:
-            raise RuntimeError(f"hfg studio ended with {self.process.wait()}")
-        self.address = found[0]
-
-    def kill_and_restart(self) -> float:
-        """Kill it, start it again at the same port, and return when it served again."""
-        port = self.address.split(":")[2].partition("/")[0]
-        self.process.send_signal(signal.SIGKILL)
-        self.process.wait()
-        if "--port" not in self._command:
-            self._command += ["--port", port]
-        self._begin()
-        return time.time()
-
-    def close(self) -> None:
-        """End it."""
-        self.process.send_signal(signal.SIGINT)
-        try:
-            self.process.wait(10)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-        self._folder.cleanup()
-
-
-@contextmanager
-def browsers() -> Iterator[Browser]:
-    """Open Chromium, which draws without a graphics card."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield browser
-        browser.close()
-
-
-class Looker:
-    """A person at the page."""
 
     def __init__(self, browser: Browser, address: str, *, calm: bool = False) -> None:
         motion = "reduce" if calm else "no-preference"
-        self.context = browser.new_context(viewport={"width": 1440, "height": 900}, reduced_motion=motion)  # type: ignore[arg-type]
+        self.context = browser.new_context(viewport=WINDOW, reduced_motion=motion)  # type: ignore[arg-type]
         self.context.set_default_timeout(PATIENCE_MS)
-        self.page: Page = self.context.new_page()
-        self.page.add_init_script(STOPWATCH)
-        self.began = time.time()
-        self.page.goto(address)
-        self.page.locator("[data-node]").first.wait_for()
-        self.ready_ms: float = self.page.evaluate("window.ready") - self.began * 1000
-        self.cdp: CDPSession = self.context.new_cdp_session(self.page)
-
-    def node(self, path: str) -> Locator:
-        return self.page.locator(f'[data-node="{path}"]')
-
-    def port(self, path: str) -> Locator:
-        return self.page.locator(f'#canvas [data-port="{path}"]')
-
-    def select(self, path: str) -> None:
-        """Click on the name of a node."""
-        self.node(path).locator(".t b").click()
-
-    def middle(self, element: Locator) -> tuple[float, float]:
-        box = element.bounding_box()
-        assert box is not None
-        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        page = self.context.new_page()
+        page.add_init_script(STOPWATCH)
+        began = time.time()
+        super().__init__(page, address)
+        self.ready_ms: float = page.evaluate("window.ready") - began * 1000
+        self.cdp: CDPSession = self.context.new_cdp_session(page)
 
     def takes(self, event: str, holds: str, act: Callable[[], object]) -> float:
         """Return the milliseconds from an event to the first painted frame for which an expression is true."""
         self.page.evaluate(f"() => {{ moment({event!r}, () => {holds}); }}")
         act()
         return float(self.page.evaluate("window.measured"))
-
-    def empty_place(self) -> tuple[float, float]:
-        """Return a place of the canvas where nothing is."""
-        x, y = self.page.evaluate(
-            """() => {
-              const box = document.getElementById("canvas").getBoundingClientRect();
-              for (let y = box.bottom - 80; y > box.top + 80; y -= 8)
-                for (let x = box.right - 80; x > box.left + 80; x -= 8)
-                  if (document.elementFromPoint(x, y)?.classList.contains("react-flow__pane")) return [x, y];
-            }"""
-        )
-        return x, y
 
     def busy(self, seconds: float) -> tuple[float, float]:
         """Return which share of the time the main thread works, and which share of a processor that takes it."""

@@ -10,7 +10,6 @@ import functools
 import hashlib
 import http.server
 import importlib.util
-import os
 import pkgutil
 import re
 import shutil
@@ -27,6 +26,7 @@ import yaml
 import hfg
 from tests.limits import patience
 from tools import build_docs
+from tools.browser import CHROMIUM, browsers
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -159,15 +159,11 @@ def address(site: Path) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    with api.sync_playwright() as playwright:
-        path = chromium or playwright.chromium.executable_path
-        if not Path(path).exists():
-            pytest.skip("Chromium is not installed")
-        launched = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"] if os.geteuid() == 0 else [])
+    pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    if not CHROMIUM:
+        pytest.skip("Chromium is not installed")
+    with browsers() as launched:
         yield launched
-        launched.close()
 
 
 @pytest.mark.soak

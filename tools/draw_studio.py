@@ -9,20 +9,19 @@ This needs Chromium, and the package playwright of the extra test. Run it after 
 from __future__ import annotations
 
 import re
-import shutil
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tools.browser import CHROMIUM, WINDOW, StudioProcess, browsers
+
 if TYPE_CHECKING:
-    from playwright.sync_api import Page, ViewportSize
+    from playwright.sync_api import Page
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "pictures" / "studio"
 ROBOT = ("examples.fetch_delivery.mission:build", "--arg", "robots=2", "--inside", "robot_0")
-WINDOW: ViewportSize = {"width": 1440, "height": 900}
 PATIENCE_S = 120.0  # the robot works meanwhile
 
 
@@ -91,31 +90,21 @@ PICTURES: dict[str, Callable[[Page], None]] = {
 
 def main() -> None:
     """Start the studio on the robot, and take each picture in light and dark."""
-    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if browser is None:
+    if not CHROMIUM:
         sys.exit("this needs Chromium on the path")
-    from playwright.sync_api import sync_playwright
-
     FOLDER.mkdir(parents=True, exist_ok=True)
-    command = [sys.executable, "-m", "hfg", "studio", *ROBOT, "--no-browser", "--run"]
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as studio, sync_playwright() as tool:
-        try:
-            assert studio.stdout is not None
-            found = next(one for line in studio.stdout if (one := re.search(r"http://\S+", line)))
-            with tool.chromium.launch(executable_path=browser, args=["--no-sandbox", "--disable-gpu"]) as started:
-                page = started.new_page(viewport=WINDOW, color_scheme="light")
-                page.set_default_timeout(1000 * PATIENCE_S)
-                page.goto(found[0])
-                for name, act in PICTURES.items():
-                    act(page)
-                    if sys.argv[1:] and name not in sys.argv[1:]:
-                        continue
-                    for theme in ("light", "dark"):
-                        page.evaluate(f"document.querySelector('[aria-label=\"Show the {theme} theme\"]')?.click()")
-                        _settle(page)
-                        page.screenshot(path=FOLDER / f"{name}-{theme}.png")
-        finally:
-            studio.terminate()
+    with StudioProcess(*ROBOT, "--run") as studio, browsers() as browser:
+        page = browser.new_page(viewport=WINDOW, color_scheme="light")
+        page.set_default_timeout(1000 * PATIENCE_S)
+        page.goto(studio.address)
+        for name, act in PICTURES.items():
+            act(page)
+            if sys.argv[1:] and name not in sys.argv[1:]:
+                continue
+            for theme in ("light", "dark"):
+                page.evaluate(f"document.querySelector('[aria-label=\"Show the {theme} theme\"]')?.click()")
+                _settle(page)
+                page.screenshot(path=FOLDER / f"{name}-{theme}.png")
 
 
 if __name__ == "__main__":

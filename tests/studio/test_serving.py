@@ -4,13 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import re
-import signal
-import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -27,8 +21,7 @@ from hfg.studio.serving import Server, StudioDoor
 from tests.limits import patience
 from tests.studio.page import live, studio_of
 from tests.studio.test_studio import doubling, ticking
-
-ROOT = Path(__file__).resolve().parents[2]
+from tools.browser import StudioProcess
 
 
 @pytest.fixture(autouse=True)
@@ -136,27 +129,10 @@ def test_a_port_in_use_is_said_in_words() -> None:
     live(main)
 
 
-@contextmanager
-def command(*arguments: str, folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """The command in a process of its own, and the address that it prints."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "XDG_STATE_HOME": str(folder / "state")}
-    program = [sys.executable, "-m", "hfg", "studio", *arguments, "--no-browser"]
-    process = subprocess.Popen(program, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True)
-    try:
-        assert process.stdout is not None
-        yield process, process.stdout.readline().strip()
-    finally:
-        process.kill()
-        process.wait(patience(10))
-        assert process.stdout is not None
-        process.stdout.close()
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_edits_are_offered_after_the_server_was_killed(tmp_path: Path) -> None:
     hfg.save(doubling(), tmp_path / "doubling.hfg.yaml")
-    arguments = ("doubling.hfg.yaml", "--allow", "tests")
 
     async def edited(address: str) -> None:
         async with await come_in(address) as socket:
@@ -173,14 +149,11 @@ def test_edits_are_offered_after_the_server_was_killed(tmp_path: Path) -> None:
             await ask(socket, t="journal", take=True)
             await ask(socket, t="save")
 
-    with command(*arguments, folder=tmp_path) as (process, address):
-        asyncio.run(edited(address))
-        process.send_signal(signal.SIGKILL)
-        process.wait(patience(10))
-    with command(*arguments, folder=tmp_path) as (process, address):
-        asyncio.run(taken_up(address))
-        process.send_signal(signal.SIGINT)
-        process.wait(patience(10))
+    with StudioProcess("doubling.hfg.yaml", "--allow", "tests", folder=tmp_path) as studio:
+        asyncio.run(edited(studio.address))
+        studio.kill()
+        studio.start()
+        asyncio.run(taken_up(studio.address))
     assert hfg.load(tmp_path / "doubling.hfg.yaml", allow=["tests"])["scaled"].factor == 9
 
 
@@ -195,18 +168,16 @@ def test_a_page_comes_back_with_its_cookie_after_a_sudden_end_and_not_after_anot
         except websockets.InvalidStatus:
             return False
 
-    with command(folder=tmp_path) as (process, address):
-        cookie = asyncio.run(cookie_of(address))
-        port = re.findall(r":(\d+)/", address)[0]
-        process.send_signal(signal.SIGKILL)
-        process.wait(patience(10))
-    with command("--port", port, folder=tmp_path) as (process, again):
-        assert again != address  # the token is another one
-        assert asyncio.run(joined(again, cookie))
-        process.send_signal(signal.SIGINT)
-        process.wait(patience(10))
-    with command("--port", port, folder=tmp_path) as (_, last):
-        assert not asyncio.run(joined(last, cookie))
+    with StudioProcess(folder=tmp_path) as studio:
+        first = studio.address
+        cookie = asyncio.run(cookie_of(first))
+        studio.kill()
+        studio.start()
+        assert studio.address != first  # the token is another one
+        assert asyncio.run(joined(studio.address, cookie))
+        studio.end()
+        studio.start()
+        assert not asyncio.run(joined(studio.address, cookie))
 
 
 @pytest.mark.slow

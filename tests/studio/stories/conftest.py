@@ -1,10 +1,9 @@
-"""One browser for all stories; each has a studio and a page of its own."""
+"""One browser, one page and one server for all stories of a process; each story has a studio of its own."""
 
 from __future__ import annotations
 
 import asyncio
 import os
-import shutil
 from asyncio import _set_running_loop
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -16,14 +15,12 @@ import pytest
 import hfg
 from hfg.studio.palette import search_types
 from tests.limits import patience
-from tests.studio.stories.bench import Bench, Story
+from tests.studio.stories.bench import IN_THE_PAGE, Bench, Story
 from tests.studio.stories.graphs import mission
+from tools.browser import CHROMIUM, WINDOW, browsers
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
-
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--disable-background-networking", "--disable-sync"]
+    from playwright.sync_api import BrowserContext, Page
 
 
 def need(what: str) -> None:
@@ -34,33 +31,36 @@ def need(what: str) -> None:
 
 
 @pytest.fixture(scope="session")
-def chromium() -> Iterator[tuple[Browser, asyncio.AbstractEventLoop]]:
+def chromium() -> Iterator[tuple[BrowserContext, asyncio.AbstractEventLoop]]:
     """Start the browser once, with the loop on which Playwright talks to it."""
     if os.environ.get("HFG_BROWSER") == "no":
         pytest.skip("HFG_BROWSER=no")
-    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
-    if found is None:
+    if not CHROMIUM:
         need("Chromium")
     try:
-        from playwright.sync_api import expect, sync_playwright
+        from playwright.sync_api import expect
     except ModuleNotFoundError:
         need("package playwright")
     expect.set_options(timeout=1000 * patience(5))
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=found, args=FLAGS)
+    with browsers() as browser:
+        context = browser.new_context(viewport=WINDOW, reduced_motion="reduce")
+        context.set_default_timeout(1000 * patience(5))
+        context.grant_permissions(["clipboard-read", "clipboard-write"])
+        context.add_init_script(IN_THE_PAGE)
         loop = asyncio.get_running_loop()
         _set_running_loop(None)
-        yield browser, loop
+        yield context, loop
         _set_running_loop(loop)
-        browser.close()
 
 
 @pytest.fixture
-def browser(chromium: tuple[Browser, asyncio.AbstractEventLoop]) -> Iterator[Browser]:
+def page(chromium: tuple[BrowserContext, asyncio.AbstractEventLoop]) -> Iterator[Page]:
     """Let Playwright's loop be the running one during a story only: other tests have loops of their own."""
-    browser, loop = chromium
+    context, loop = chromium
     _set_running_loop(loop)
-    yield browser
+    yield context.pages[0] if context.pages else context.new_page()
+    for other in context.pages[1:]:
+        other.close()
     _set_running_loop(None)
 
 
@@ -71,29 +71,30 @@ def catalogue() -> None:
         thread.submit(lambda: asyncio.run(search_types(hfg.Graph("empty"), "threshold", "", "", 1))).result()
 
 
+@pytest.fixture(scope="session")
+def bench() -> Iterator[Bench]:
+    bench = Bench()
+    yield bench
+    bench.close()
+
+
 Open = Callable[..., Story]
 
 
 @pytest.fixture
-def open_studio(browser: Browser, catalogue: None, tmp_path: Path) -> Iterator[Open]:
+def open_studio(page: Page, bench: Bench, catalogue: None, tmp_path: Path) -> Iterator[Open]:
     """Open a studio of a graph in the browser."""
-    benches: list[Bench] = []
     stories: list[Story] = []
-    context = browser.new_context(viewport={"width": 1440, "height": 900}, reduced_motion="reduce")
-    context.set_default_timeout(1000 * patience(5))
-    context.grant_permissions(["clipboard-read", "clipboard-write"])
 
     def opened(graph: hfg.Graph | None = None, **options: Any) -> Story:
-        bench = Bench(graph or mission(), tmp_path, **options)
-        benches.append(bench)
-        story = Story(bench, context.new_page())
-        stories.append(story)
-        return story
+        bench.open(graph or mission(), tmp_path, **options)
+        stories.append(Story(bench, page))
+        return stories[-1]
 
     yield opened
-    context.close()
-    for bench in benches:
-        bench.close()
+    for story in stories:
+        story.close()
+    bench.shut()
     assert [error for story in stories for error in story.errors] == []
 
 

@@ -92,15 +92,18 @@ class Stamp(hfg.Node):
 
 
 class Drive(hfg.Node):
-    """Be active for a while, then hand on."""
+    """Be active for a while, then hand on; another duration applies at once."""
 
     done = hfg.Event()
-    duration = hfg.Parameter(0.4, Interval(gt=0, le=10), unit="s")
+    duration = hfg.Parameter(0.4, Interval(gt=0, le=1000), unit="s")
 
     @hfg.slot
     async def begin(self) -> None:
         """Drive."""
-        await asyncio.sleep(self.duration)
+        clock = asyncio.get_running_loop().time
+        began = clock()
+        while clock() < began + self.duration:
+            await asyncio.sleep(0.02)
         self.done.trigger()
 
 

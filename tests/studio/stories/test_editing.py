@@ -48,6 +48,19 @@ def test_the_palette_shows_what_a_type_is_before_one_adds_it(story: Story) -> No
     assert story.bench.call(lambda: story.graph[added]._type.qualname) == "scaled"
 
 
+def test_whoever_presses_enter_before_the_palette_has_answered_gets_the_node(story: Story) -> None:
+    before = set(story.graph.nodes)
+    story.page.mouse.dblclick(*story.empty_place())
+    story.page.locator(".palette li.sel").wait_for()
+    with story.bench.held():
+        story.page.keyboard.type("threshold")
+        story.press("Enter")
+    story.bench.until(lambda: len(story.graph.nodes) == len(before) + 1)
+    (added,) = set(story.graph.nodes) - before
+    assert "threshold" in added
+    expect(story.page.locator(".palette")).to_have_count(0)
+
+
 def test_a_deleted_node_comes_back_by_undo_with_its_edges(story: Story) -> None:
     story.start()
     before = edges_of(story)
@@ -66,6 +79,17 @@ def test_a_wire_from_port_to_port_lets_values_flow(story: Story) -> None:
     story.drag("numbers.out", "spare.value")
     story.bench.until(lambda: any(edge.label == "numbers.out -> spare.value" for edge in story.graph.edges))
     story.moves_on("spare")
+
+
+def test_whoever_drops_a_wire_before_the_studio_has_said_what_takes_it_gets_the_edge(story: Story) -> None:
+    start, end = story.middle(story.port("numbers.out")), story.middle(story.port("spare.value"))
+    with story.bench.held():
+        story.page.mouse.move(*start)
+        story.page.mouse.down()
+        story.page.mouse.move(*end, steps=3)
+        story.page.mouse.up()
+    story.settle()
+    assert "numbers.out -> spare.value" in edges_of(story)
 
 
 def test_a_refusal_says_why_before_one_drops(story: Story) -> None:
@@ -213,6 +237,20 @@ def test_a_node_runs_in_the_group_that_one_chooses(story: Story) -> None:
     story.page.locator("#group-of-node").select_option("work")
     story.bench.until(lambda: story.bench.studio.tables.of["nodes"]["scale"].group == "work")
     story.moves_on("store")
+
+
+def test_a_sentence_stays_while_the_mouse_is_on_it(story: Story) -> None:
+    story.select("spare")
+    story.press("Delete")
+    expect(story.node("spare")).to_have_count(0)
+    story.press("Control+z")
+    toast = story.page.locator(".toast", has_text="Undone")
+    toast.hover()
+    story.time_passes()
+    expect(toast).to_be_visible()
+    story.page.mouse.move(0, 0)
+    story.time_passes()
+    expect(toast).to_have_count(0)
 
 
 def test_two_pages_see_the_same(story: Story) -> None:

@@ -10,6 +10,7 @@ from playwright.sync_api import expect
 from tests.studio.stories.bench import Story
 
 pytestmark = pytest.mark.slow
+LONG_S = 1000.0
 
 BRIGHT = """canvas => {
   const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
@@ -17,14 +18,9 @@ BRIGHT = """canvas => {
 }"""
 
 
-def pin(story: Story, node: str, port: str) -> None:
-    story.select(node)
-    story.page.locator("#side .prt").get_by_role("button", name=port, exact=True).click()
-
-
 def test_a_number_is_seen_at_the_port_and_plotted_when_pinned(story: Story) -> None:
     story.start()
-    pin(story, "scale", "out")
+    story.pin("scale", "out")
     expect(story.page.locator(".prt .v").last).to_have_text(re.compile(r"\d+"))
     plot = story.page.locator('[data-plot="scale.out"]')
     expect(plot).to_be_visible()
@@ -35,14 +31,10 @@ def test_a_number_is_seen_at_the_port_and_plotted_when_pinned(story: Story) -> N
 
 def test_a_picture_is_seen_as_the_node_draws_it(story: Story) -> None:
     story.start()
-    pin(story, "draw", "out")
+    story.pin("draw", "out")
     probe = story.page.locator('canvas[data-probe="draw.out"]')
-    expect(probe).to_be_visible()
-    for _ in range(100):
-        width, height, square, ground = probe.evaluate(BRIGHT)
-        if width == 64:
-            break
-        story.page.wait_for_timeout(50)
+    story.until(lambda: probe.evaluate(BRIGHT)[0] == 64, "the picture is there")
+    width, height, square, ground = probe.evaluate(BRIGHT)
     assert (width, height) == (64, 48)
     assert square > 150
     assert ground < 60
@@ -60,12 +52,17 @@ def test_the_value_of_a_port_appears_where_the_mouse_rests(story: Story) -> None
 
 
 def test_one_goes_into_a_subgraph_sees_its_activity_and_comes_back(story: Story) -> None:
+    there, back = story.node("errand/there"), story.node("errand/back")
+    story.bench.set("errand/there", "duration", LONG_S)
+    story.bench.set("errand/back", "duration", LONG_S)
     story.start()
     story.node("errand").dblclick(position={"x": 12, "y": 28})
-    expect(story.node("errand/there")).to_be_visible()
+    expect(there).to_be_visible()
     expect(story.page.locator(".crumbs .here")).to_contain_text("errand")
-    expect(story.node("errand/there")).to_have_class(re.compile(r"\bactive\b"))
-    expect(story.node("errand/back")).to_have_class(re.compile(r"\bactive\b"))
+    expect(there).to_have_class(re.compile(r"\bactive\b"))
+    expect(back).not_to_have_class(re.compile(r"\bactive\b"))
+    story.bench.set("errand/there", "duration", 0.1)
+    expect(back).to_have_class(re.compile(r"\bactive\b"))
     story.page.locator("#canvas").focus()
     story.press("Escape", "Escape", "Backspace")
     expect(story.node("numbers")).to_be_visible()
@@ -73,14 +70,15 @@ def test_one_goes_into_a_subgraph_sees_its_activity_and_comes_back(story: Story)
 
 def test_a_choice_in_the_timeline_is_a_choice_in_the_graph(story: Story) -> None:
     story.start()
-    canvas = story.page.locator("#time canvas")
-    box = canvas.bounding_box()
+    box = story.page.locator("#time canvas").bounding_box()
     assert box is not None
-    for _ in range(100):  # until a span of activity has been drawn under the mouse
+
+    def is_chosen() -> bool:
+        """Whether a span of activity has been drawn under the mouse."""
         story.page.mouse.click(box["x"] + 136 + (box["width"] - 148) * 0.04, box["y"] + 50)
-        if story.page.locator("#side h2", has_text=re.compile("^(errand|rest)$")).count():
-            break
-        story.page.wait_for_timeout(50)
+        return story.page.locator("#side h2", has_text=re.compile("^(errand|rest)$")).count() > 0
+
+    story.until(is_chosen, "a click on a span chooses the node")
     expect(story.page.locator("[data-node].sel")).to_have_count(1)
     story.press("l")
     expect(story.page.get_by_role("button", name="Follow", exact=True)).to_be_visible()
@@ -112,13 +110,16 @@ def test_arrows_go_from_node_to_node_along_edges(story: Story) -> None:
     expect(reached).to_have_text(re.compile("scale|draw"))
 
 
-def test_light_and_dark_are_kept(story: Story) -> None:
+def test_the_page_has_the_theme_of_the_system_until_one_chooses_another_which_is_kept(story: Story) -> None:
     root = story.page.locator("html")
-    before = root.get_attribute("data-theme")
-    story.page.get_by_role("button", name=re.compile("theme")).click()
-    expect(root).not_to_have_attribute("data-theme", str(before))
+    expect(root).to_have_attribute("data-theme", "light")
+    story.page.emulate_media(color_scheme="dark")
     story.page.reload()
-    expect(root).not_to_have_attribute("data-theme", str(before))
+    expect(root).to_have_attribute("data-theme", "dark")
+    story.page.get_by_role("button", name="Show the light theme").click()
+    expect(root).to_have_attribute("data-theme", "light")
+    story.page.reload()
+    expect(root).to_have_attribute("data-theme", "light")
 
 
 def test_the_view_of_activity_alone_hides_data_and_comes_from_the_studio(story: Story) -> None:

@@ -79,11 +79,7 @@ def test_a_frame_stays_around_its_nodes_wherever_they_go_and_whatever_they_are_c
     story.bench.call(lambda: story.graph.edit(*moves))
     story.bench.call(lambda: story.bench.studio.refresh_all())
     expect(story.node("larger")).to_be_visible()
-    for _ in range(200):
-        if height(frame) > before + 50:
-            break
-        story.page.wait_for_timeout(50)
-    assert height(frame) > before + 50
+    story.until(lambda: height(frame) > before + 50, "the frame is around both again")
     assert notes(story, "larger")["frame"] == "frame 1"
 
 

@@ -38,6 +38,7 @@ def test_keys_move_a_value_by_steps_and_undo_takes_it_back(story: Story) -> None
 def test_a_drag_is_one_step_of_the_history(story: Story) -> None:
     story.start()
     story.select("scale")
+    story.settle()
     box = story.page.locator('[data-slider="factor"]').bounding_box()
     assert box is not None
     mouse = story.page.mouse
@@ -65,6 +66,24 @@ def test_a_double_click_on_the_name_resets_a_value(story: Story) -> None:
     story.select("scale")
     field(story, "factor").fill("7")
     story.press("Enter")
-    story.bench.until(lambda: story.graph["scale"].factor == 7)
+    expect(field(story, "factor")).to_have_value("7")
     story.page.locator("#side label", has_text="factor").dblclick()
     story.bench.until(lambda: story.graph["scale"].factor == 2)
+
+
+def test_whoever_is_faster_than_the_studio_goes_on_from_what_was_set(story: Story) -> None:
+    story.select("scale")
+    with story.bench.held():
+        field(story, "factor").fill("7")
+        story.press("Enter")
+        expect(field(story, "factor")).to_have_value("7")
+        story.press("ArrowUp", "ArrowUp")
+        expect(field(story, "factor")).to_have_value("9")
+    story.bench.until(lambda: story.graph["scale"].factor == 9)
+    with story.bench.held():
+        field(story, "factor").fill("3")
+        story.press("Enter")
+        story.page.locator("#side label", has_text="factor").dblclick()
+    story.settle()
+    assert story.bench.node("scale").factor == 2
+    expect(field(story, "factor")).to_have_value("2")

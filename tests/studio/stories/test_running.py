@@ -10,6 +10,7 @@ from playwright.sync_api import expect
 from tests.studio.stories.bench import Story
 
 pytestmark = pytest.mark.slow
+LONG_S = 1000.0
 
 
 def test_all_nodes_of_the_graph_are_on_the_page(story: Story) -> None:
@@ -45,7 +46,7 @@ def test_a_step_moves_a_paused_graph_by_one_wave(story: Story) -> None:
     for _ in range(8):  # what was under way may take several
         before = story.bench.node("store").seen
         story.press(".")
-        story.bench.state("paused")
+        story.settle()
         if story.bench.node("store").seen > before:
             break
     assert before < story.bench.node("store").seen <= before + 2
@@ -60,22 +61,27 @@ def test_the_run_ends_when_one_stops_it(story: Story) -> None:
 
 
 def test_whoever_has_the_activity_has_the_ring(story: Story) -> None:
-    story.graph["rest"].duration = 5.0
+    story.bench.set("rest", "duration", LONG_S)
     story.start()
-    rest = story.node("rest")
+    rest, errand = story.node("rest"), story.node("errand")
     expect(rest).to_have_class(re.compile(r"\bactive\b"))
+    expect(errand).not_to_have_class(re.compile(r"\bactive\b"))
     assert story.bench.call(lambda: story.bench.is_active("rest"))
-    story.bench.call(lambda: setattr(story.graph["rest"], "duration", 0.1))
-    expect(story.node("errand")).to_contain_text(re.compile("there|back"))
-    expect(story.node("errand")).to_have_class(re.compile(r"\bactive\b"))
+    story.bench.set("errand/back", "duration", LONG_S)
+    story.bench.set("rest", "duration", 0.1)
+    expect(errand).to_contain_text("back")
+    expect(errand).to_have_class(re.compile(r"\bactive\b"))
+    expect(rest).not_to_have_class(re.compile(r"\bactive\b"))
 
 
 def test_the_reset_of_activity_begins_at_the_start_again(story: Story) -> None:
+    story.bench.set("rest", "duration", LONG_S)
     story.start()
+    story.bench.until(lambda: story.bench.is_active("rest"), "the errand is over")
     story.press("Control+k")
     story.page.keyboard.type("reset the act")
     story.press("Enter")
-    story.bench.until(lambda: story.bench.is_active("errand/there"))
+    story.bench.until(lambda: story.bench.is_active("errand/there"), "it begins again")
 
 
 def test_a_breakpoint_pauses_where_it_is_set(story: Story) -> None:
@@ -92,7 +98,7 @@ def test_a_breakpoint_pauses_where_it_is_set(story: Story) -> None:
 
 def test_a_failure_is_said_once_and_the_list_leads_to_the_node(story: Story) -> None:
     story.start()
-    story.bench.call(lambda: setattr(story.graph["check"], "limit", 0))
+    story.bench.set("check", "limit", 0)
     story.bench.state("ended")
     expect(story.page.locator(".toast.bad")).to_contain_text("is too large")
     story.page.get_by_role("tab", name="Problems").click()
