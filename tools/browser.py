@@ -147,7 +147,7 @@ class Person:
     def __init__(self, page: Page, address: str) -> None:
         self.page = page
         page.goto(address)
-        page.locator("[data-node]").first.wait_for()
+        page.locator("[data-node], .start").first.wait_for()
 
     def node(self, path: str) -> Locator:
         """Find a node."""

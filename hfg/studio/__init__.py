@@ -11,6 +11,7 @@
     steering     the run: start, pause, steps, breakpoints         failing     what a run failed with
     layouts      where everything is drawn  clipboard  nodes as text
     project      the file: open, save, who else has written it     journal     edits that survive a sudden end
+    starters     graphs for users who have none yet, with `ball`
     requests, asking   what a page asks for                        refusing    a refusal as fields
     running_elsewhere  runs of other programs
     studio       all of it together

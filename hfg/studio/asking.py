@@ -25,6 +25,7 @@ from hfg.studio.refusing import Refused
 from hfg.studio.running_elsewhere import runs_of_this_user
 from hfg.studio.sampled_topics import node_measures
 from hfg.studio.showing import shown_value
+from hfg.studio.starters import starters
 from hfg.studio.targets import targets
 
 __all__ = ["ask"]
@@ -161,7 +162,8 @@ async def _folder(host: Following, args: _Path) -> Any:
 async def _start(host: Following, args: _Nothing) -> Any:
     listed = host.project.listing("")
     runs = await asyncio.to_thread(runs_of_this_user)
-    return {"folder": host.project.folder.name, "files": listed["files"], "runs": runs}
+    offered = await asyncio.to_thread(starters)
+    return {"folder": host.project.folder.name, "files": listed["files"], "runs": runs, "starters": offered}
 
 
 async def _difference(host: Following, args: _Nothing) -> Any:

@@ -233,10 +233,11 @@ class Visible(_Message, frozen=True, tag="visible"):
 
 
 class Open(Request, frozen=True, tag="open"):
-    """Take another file of the folder; `discard` gives unsaved edits up."""
+    """Take another file of the folder, or a graph of `starters`; `discard` gives unsaved edits up."""
 
-    path: Text
+    path: Text = ""
     discard: bool = False
+    starter: Text = ""
 
 
 class Save(Request, frozen=True, tag="save"):

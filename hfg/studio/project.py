@@ -92,6 +92,7 @@ class Project:
             changes=self.changes,
             can_save=file is not None and file.name.endswith(SUFFIX),
             elsewhere=self.elsewhere,
+            graph=self.graph.name,
             journal=None if offer is None else JournalOffer(*offer),
         )
 
@@ -159,14 +160,23 @@ class Project:
           Refused: there are unsaved edits, or it is outside of the folder.
           FileError: it holds no graph.
         """
-        self._need_saved(discard)
         if not path:
-            self._take(Graph("graph"), None)
+            self.begin(Graph("graph"), discard=discard)
             return
+        self._need_saved(discard)
         file = self.within(path)
         if not file.is_file():
             raise Refused("file", f'there is no file "{path}" in the folder "{self.folder.name}"')
         self._take(self._read(file), file)
+
+    def begin(self, graph: Graph, *, discard: bool) -> None:
+        """Take a graph that has no file yet.
+
+        Raises:
+          Refused: there are unsaved edits.
+        """
+        self._need_saved(discard)
+        self._take(graph, None)
 
     def reread(self) -> None:
         """Take the file as it is on the disk."""

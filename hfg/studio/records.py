@@ -289,6 +289,8 @@ class FileRecord(msgspec.Struct, frozen=True):
     """The file of the graph.
 
     Attributes:
+      name: of the file; without one, of the graph.
+      graph: the name of the graph.
       path: relative to the folder; "" if there is none yet.
       kind: "yaml", "python", "recording" or "none".
       changes: edits since it was read or written.
@@ -303,6 +305,7 @@ class FileRecord(msgspec.Struct, frozen=True):
     changes: int
     can_save: bool
     elsewhere: str = ""
+    graph: str = ""
     journal: JournalOffer | None = None
 
 

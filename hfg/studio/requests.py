@@ -15,6 +15,7 @@ from hfg.studio.asking import ask
 from hfg.studio.following import Following
 from hfg.studio.offering import change_of, offered_action, signal_of
 from hfg.studio.refusing import Refused
+from hfg.studio.starters import starter_graph
 from hfg.studio.viewing import Viewer
 from hfg.studio.words import in_words
 
@@ -166,8 +167,11 @@ async def _unbreak(host: Host, viewer: Viewer, message: m.Unbreak) -> None:
 async def _open(host: Host, viewer: Viewer, message: m.Open) -> None:
     async with host.turn:
         _need_rest(host)
-        host.project.open(message.path, discard=message.discard)
-        host.take_graph(viewer.number, f"open {message.path}")
+        if message.starter:
+            host.project.begin(starter_graph(message.starter), discard=message.discard)
+        else:
+            host.project.open(message.path, discard=message.discard)
+        host.take_graph(viewer.number, f"open {message.path or host.graph.name}")
 
 
 async def _reread(host: Host, viewer: Viewer, message: m.Reread) -> None:

@@ -19,6 +19,7 @@ from hfg.studio.showing import image_frame, number_in, shown_value
 __all__ = ["HistoryTopic", "ImageTopic", "TappedTopic", "ValueTopic"]
 
 _MOST_POINTS: Final = 2000
+_RATE_OVER_S: Final = 1.0
 
 
 class TappedTopic(RunTopic):
@@ -32,7 +33,7 @@ class TappedTopic(RunTopic):
         self._path = path
         self.tap: Tap | None = None
         self._seen = 0
-        self._rate = (0.0, 0, 0.0)  # since when, how many then, how many per second before
+        self._rate: tuple[float, int, float | None] = (0.0, 0, None)  # since when, how many then, and the rate before
         if host.steering.run is not None:
             self.run = host.steering.run
             self.attach(self.run)  # a path that leads nowhere is refused at once
@@ -41,6 +42,7 @@ class TappedTopic(RunTopic):
     def attach(self, run: Run) -> None:
         self.tap = run.tap(place_at(self.host.graph, self._path), size=self.size)
         self._seen = 0
+        self._rate = self.time(), 0, None
 
     @override
     def let_go(self) -> None:
@@ -56,14 +58,15 @@ class TappedTopic(RunTopic):
         return True
 
     def rate(self) -> float:
-        """Return how many pass a second, over the last one to two seconds."""
+        """Return how many pass per second, over the last one to two seconds; less in the first second."""
         assert self.tap is not None
         now, seen = self.time(), self.tap.seen
         since, before, last = self._rate
-        if now - since >= 1.0:
-            last = (seen - before) / (now - since)
-            self._rate = now, seen, last
-        return last
+        so_far = (seen - before) / (now - since) if now > since else 0.0
+        if now - since < _RATE_OVER_S:
+            return so_far if last is None else last
+        self._rate = now, seen, so_far
+        return so_far
 
 
 class ValueTopic(TappedTopic):

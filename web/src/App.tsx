@@ -14,6 +14,7 @@ import { Toasts } from "./shell/Toasts";
 import { TopBar } from "./shell/TopBar";
 import { Stage } from "./stage/Stage";
 import { useOffers } from "./stage/offers";
+import { isStart } from "./state/looking";
 import { keepTheme, useStudio } from "./state/studio";
 import { BottomPanel } from "./timeline/BottomPanel";
 import { applyTheme } from "./ui/colours";
@@ -23,11 +24,15 @@ export function App() {
   const theme = useStudio((s) => s.theme);
   const side = useStudio((s) => s.side);
   const old = useStudio((s) => s.age === 3);
-  const start = useStudio((s) => s.rev >= 0 && !s.begun && Object.keys(s.tables.nodes).length === 0 && s.tables.studio.file?.kind === "none");
+  const start = useStudio(isStart);
+  const name = useStudio((s) => s.tables.studio.file?.graph ?? "");
   const staged = useStudio((s) => s.stage);
   const hasViews = useOffers().views.length > 0;
   useKeys();
   useFailures();
+  useEffect(() => {
+    document.title = start || name === "" ? "hfg studio" : `${name} · hfg studio`;
+  }, [start, name]);
   useEffect(() => {
     applyTheme(theme);
     keepTheme(theme);

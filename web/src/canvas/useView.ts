@@ -87,7 +87,7 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
   return { level, partly, onMove, onMoveEnd, showAll };
 }
 
-const key = (layout: LayoutRecord | undefined): string => (layout ? `${studio().hello?.name}:${studio().level}:${layout.view}` : "");
+const key = (layout: LayoutRecord | undefined): string => (layout ? `${studio().tables.studio.file?.graph}:${studio().tables.studio.file?.path}:${studio().level}:${layout.view}` : "");
 
 function isPartly(layout: LayoutRecord | undefined, view: Viewport, element: HTMLElement | null): boolean {
   if (!layout || !element) return false;

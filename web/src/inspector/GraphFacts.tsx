@@ -6,12 +6,13 @@ import { plural } from "../ui/words";
 export function GraphFacts() {
   const level = useStudio((s) => s.level);
   const hello = useStudio((s) => s.hello);
+  const name = useStudio((s) => s.tables.studio.file?.graph);
   const tables = useStudio((s) => s.tables);
   const inside = Object.values(tables.nodes).filter((node) => node.level === level).length;
   return (
     <>
       <div className="who">
-        <h2 className="n">{level === "" ? hello?.name || "graph" : level.split("/").at(-1)}</h2>
+        <h2 className="n">{level === "" ? name || "graph" : level.split("/").at(-1)}</h2>
         <div className="p">
           {plural(inside, "node")} here · {plural(Object.keys(tables.nodes).length, "node")} in all
         </div>

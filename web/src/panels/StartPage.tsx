@@ -1,44 +1,76 @@
 import { useEffect, useState } from "react";
 import { ask, question } from "../state/actions";
-import { change, useStudio } from "../state/studio";
+import { change, type Popover, useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
-import { CARD_PICTURES } from "./pictures";
+import { plural } from "../ui/words";
+import { CARD_PICTURES, STARTER_PICTURES } from "./pictures";
+
+interface Starter {
+  name: string;
+  title: string;
+  about: string;
+  nodes: number;
+  edges: number;
+}
 
 interface Start {
   folder: string;
   files: { name: string; kind: string; changed: number }[];
   runs: string[];
+  starters: Starter[];
 }
 
 const MOST_CARDS = 12;
+const NOTHING: Start = { folder: "", files: [], runs: [], starters: [] };
 
-/** Nothing is open: what can be opened here, and an empty graph. */
+/** Opens a graph that the studio offers, and lets it run. */
+async function begin(starter: string, then: Popover = null): Promise<void> {
+  if ((await ask({ t: "open", starter })) === null) return;
+  if ((await ask({ t: "start", stay: true })) !== null) change({ popover: then });
+}
+
+/** Nothing is open: a graph that runs at once, what can be opened here, and an empty graph. */
 export function StartPage() {
   const folder = useStudio((s) => s.tables.studio.file?.folder ?? "");
-  const [start, setStart] = useState<Start>({ folder: "", files: [], runs: [] });
+  const [start, setStart] = useState<Start>(NOTHING);
   useEffect(() => {
     question<Start>("start", {}).then(setStart, () => undefined);
   }, []);
   const files = [...start.files].sort((a, b) => b.changed - a.changed).slice(0, MOST_CARDS);
+  const [first, ...others] = start.starters;
   return (
     <main className="start">
       <div className="in">
-        <div style={{ display: "flex", alignItems: "flex-end", gap: 24, marginBottom: 24 }}>
+        <div className="start-top">
           <div>
-            <h1 style={{ font: "600 24px/32px var(--font)", margin: 0 }}>Open a graph, or begin one</h1>
-            <p style={{ marginTop: 4, fontSize: 13, lineHeight: "20px", color: "var(--ink2)" }}>
+            <h1>Open a graph, or see one run</h1>
+            <p>
               Files come from <b>{start.folder || folder}</b>. Nothing leaves this machine.
             </p>
           </div>
           <span className="spring" />
-          <button type="button" className="btn line" style={{ height: 32, padding: "0 12px" }} onClick={() => change({ popover: "open" })}>
+          <button type="button" className="btn line" onClick={() => change({ popover: "open" })}>
             <Icon name="file" />
             Open a file <kbd>Ctrl O</kbd>
           </button>
-          <button type="button" className="btn primary" style={{ height: 32 }} onClick={() => change({ begun: true })}>
+          <button type="button" className="btn primary" onClick={() => change({ begun: true })}>
             <Icon name="plus" />
             New graph
           </button>
+        </div>
+        {first && <First starter={first} />}
+        {others.length > 0 && <h2 className="start-head">Start from something small</h2>}
+        <div className="cards">
+          {others.map((one) => (
+            <button type="button" className="card" key={one.name} onClick={() => void begin(one.name)}>
+              <span className="pic">{STARTER_PICTURES[one.name]}</span>
+              <span className="tx">
+                <b>{one.title}</b>
+                <p>{one.about}</p>
+                <small>{plural(one.nodes, "node")}, runs at once</small>
+              </span>
+            </button>
+          ))}
         </div>
         <h2 className="start-head">In this folder</h2>
         {files.length === 0 && <p className="second">No graph files yet. What you save appears here.</p>}
@@ -53,17 +85,46 @@ export function StartPage() {
             </button>
           ))}
         </div>
-        <h2 className="start-head" style={{ marginTop: 32 }}>
-          Runs on this machine
-        </h2>
+        <h2 className="start-head">Runs on this machine</h2>
         {start.runs.length === 0 ? (
           <p className="second">
             None. A graph that was started by <span className="mono">hfg run</span> appears here.
           </p>
         ) : (
-          start.runs.map((name) => <p key={name}>{name}</p>)
+          start.runs.map((name) => (
+            <p key={name}>
+              <b>{name}</b> <span className="second mono">hfg studio --attach {name}</span>
+            </p>
+          ))
         )}
       </div>
     </main>
+  );
+}
+
+/** The graph to look at first, in one click; with the tour in another. */
+function First({ starter }: { starter: Starter }) {
+  return (
+    <section className="card first-card" aria-label={starter.title}>
+      <span className="pic">{STARTER_PICTURES[starter.name]}</span>
+      <div className="tx">
+        <p className="lead">Runs at once, no robot needed</p>
+        <h2>{starter.title}</h2>
+        <p className="about">{starter.about}</p>
+        <small>
+          {plural(starter.nodes, "node")}, {plural(starter.edges, "edge")}, real time
+        </small>
+        <span className="spring" />
+        <div className="row">
+          <button type="button" className="btn primary" autoFocus onClick={() => void begin(starter.name)}>
+            <Icon name="play" />
+            Run it
+          </button>
+          <button type="button" className="btn line" onClick={() => void begin(starter.name, "tour")}>
+            Take the tour, 5 steps
+          </button>
+        </div>
+      </div>
+    </section>
   );
 }

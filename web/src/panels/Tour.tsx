@@ -1,34 +1,80 @@
-import { useState } from "react";
-import { change } from "../state/studio";
+import { useEffect, useLayoutEffect, useRef, useState } from "react";
+import { select } from "../state/actions";
+import { change, studio } from "../state/studio";
+import { type Place, placeOf } from "./place";
 
 interface Step {
-  at: string;
   title: string;
   text: string;
+  /** What it is about; looked for again and again, because activity moves. */
+  at: () => Element | null | undefined;
+  before?: () => void;
+}
+
+const nodeElement = (path: string) => document.querySelector(`#canvas [data-node="${CSS.escape(path)}"]`);
+
+/** A node of this level that computes something, if there is one: with an input, an output and a parameter. */
+function worker(): string {
+  const { tables, level } = studio();
+  const nodes = Object.values(tables.nodes).filter((one) => one.level === level && !one.subgraph);
+  const has = (kind: string) => (one: (typeof nodes)[number]) => one.ports.some((port) => port.kind === kind);
+  const found = nodes.find((one) => has("input")(one) && has("output")(one) && one.shown.length > 0) ?? nodes.find((one) => one.shown.length > 0);
+  return (found ?? nodes[0])?.path ?? "";
 }
 
 const STEPS: Step[] = [
-  { at: ".node", title: "A node does one thing", text: "Inputs are on its left, outputs on its right. It fires when all inputs have a value; the bars show how long the last firings took." },
   {
-    at: ".node.active, .node",
-    title: "The orange outline is the state",
-    text: "There is no state machine. Whoever has the activity is the state, and gives it on over a double line. Double click a subgraph to see what goes on inside.",
+    at: () => nodeElement(worker()),
+    title: "A node does one thing",
+    text: "Inputs are on its left, outputs on its right. It fires when all inputs have a value. The bars show how long the last firings took.",
   },
-  { at: "#canvas .port", title: "Draw a line from a port", text: "Ports that take it light up, all others say why not. Drop it on nothing to choose a node that fits." },
-  { at: "#side", title: "Change it while it runs", text: "Every parameter takes effect at once, and everything can be undone. Click a port to pin what it sends." },
-  { at: "#time", title: "When, and for how long", text: "Activity above, firings of each group below. What you choose here is chosen in the graph." },
+  {
+    at: () => document.querySelector("#canvas .node.active") ?? document.querySelector("#canvas .node"),
+    title: "The orange outline is the state",
+    text: "There is no state machine. The node that has the activity is the state, and hands it on over a double line. Double click a subgraph to see what goes on inside.",
+  },
+  {
+    at: () => nodeElement(worker())?.parentElement?.querySelector('[data-kind="output"], [data-kind="event"]'),
+    title: "Draw a line from a port",
+    text: "Ports that take it light up, all others say why not. Drop it on nothing to choose a node that fits.",
+  },
+  {
+    before: () => {
+      change({ side: true });
+      select([worker()].filter((path) => path !== ""));
+    },
+    at: () => document.querySelector("#side"),
+    title: "Change it while it runs",
+    text: "Every parameter takes effect at once, and everything can be undone. Click a port to pin what it sends.",
+  },
+  {
+    before: () => change({ time: true, tab: "timeline" }),
+    at: () => document.querySelector("#time"),
+    title: "When, and for how long",
+    text: "Activity above, firings of each group below. What you choose here is chosen in the graph.",
+  },
 ];
+
+const LOOK_EVERY_MS = 200;
 
 export function Tour() {
   const [index, setIndex] = useState(0);
+  const [place, setPlace] = useState<Place>({ left: 200, top: 200, side: "right" });
+  const root = useRef<HTMLDivElement>(null);
   const step = STEPS[index]!;
-  const box = document.querySelector(step.at)?.getBoundingClientRect() ?? new DOMRect(200, 200, 100, 40);
-  const right = box.right + 320 < window.innerWidth;
-  const left = right ? box.right + 16 : Math.max(60, Math.min(box.left, window.innerWidth) - 324);
-  const top = Math.max(56, Math.min(box.top - 8, window.innerHeight - 220));
+  useEffect(() => step.before?.(), [step]);
+  useLayoutEffect(() => {
+    const look = () => {
+      const box = step.at()?.getBoundingClientRect();
+      if (box) setPlace(placeOf(box, root.current?.offsetHeight ?? 160, window.innerWidth, window.innerHeight));
+    };
+    look();
+    const timer = setInterval(look, LOOK_EVERY_MS);
+    return () => clearInterval(timer);
+  }, [step]);
   const leave = () => change({ popover: null });
   return (
-    <div className={`pop coach grows${right ? "" : " from-right"}`} style={{ left, top, position: "fixed" }} role="dialog" aria-label={step.title}>
+    <div className={`pop coach ${place.side}`} ref={root} style={{ left: place.left, top: place.top, position: "fixed" }} role="dialog" aria-label={step.title}>
       <h4>{step.title}</h4>
       <p>{step.text}</p>
       <div className="row">
@@ -48,4 +94,3 @@ export function Tour() {
     </div>
   );
 }
-

@@ -33,8 +33,32 @@ function Frame({ children }: { children: ReactNode }) {
   );
 }
 
-export const CARD_PICTURES: ReactNode[] = [
-  <Frame key="mission">
+const Two = (
+  <Frame>
+    <Line d="M84 66H148" />
+    <Box x={16} y={52} w={68} name="clock" />
+    <Box x={148} y={52} w={76} name="wave" />
+    <Square x={84} y={66} />
+    <Square x={148} y={66} />
+  </Frame>
+);
+
+const Signal = (
+  <Frame>
+    <Double d="M152 56V84" />
+    <Line d="M68 42H108" />
+    <Box x={12} y={28} w={56} name="radio" />
+    <Box x={108} y={28} w={88} name="wait" active />
+    <Box x={108} y={84} w={88} name="drive" />
+    <Square x={68} y={42} />
+    <Square x={108} y={42} />
+    <Circle x={152} y={56} />
+    <Circle x={152} y={84} />
+  </Frame>
+);
+
+const Mission = (
+  <Frame>
     <Double d="M120 32V52" />
     <Double d="M120 80V100" />
     <Box x={80} y={4} w={80} name="fetch" />
@@ -42,30 +66,36 @@ export const CARD_PICTURES: ReactNode[] = [
     <Box x={80} y={100} w={80} name="deliver" />
     <Circle x={120} y={52} />
     <Circle x={120} y={100} />
-  </Frame>,
-  <Frame key="two">
-    <Line d="M84 66H148" />
-    <Box x={16} y={52} w={68} name="count" />
-    <Box x={148} y={52} w={76} name="show" />
-    <Square x={84} y={66} />
-    <Square x={148} y={66} />
-  </Frame>,
-  <Frame key="coins">
-    <Line d="M66 40H92V66H100" />
-    <Line d="M156 66H172V102H156" />
-    <Box x={10} y={26} w={56} name="photo" />
-    <Box x={100} y={52} w={56} name="blur" />
-    <Box x={84} y={88} w={72} name="circles" />
-    <Square x={66} y={40} />
-    <Square x={100} y={66} />
-    <Square x={156} y={66} />
-    <Square x={156} y={102} />
-  </Frame>,
-  <Frame key="wait">
-    <Double d="M120 46V84" />
-    <Box x={76} y={18} w={88} name="wait" active />
-    <Box x={76} y={84} w={88} name="drive" />
-    <Circle x={120} y={46} />
-    <Circle x={120} y={84} />
-  </Frame>,
-];
+  </Frame>
+);
+
+/** What the camera sees, and the mission that follows it. */
+const Ball = (
+  <svg width="404" height="232" viewBox="0 0 404 232" aria-hidden="true">
+    <g transform="translate(16 46)">
+      <rect width="224" height="140" rx="4" fill="#39424c" />
+      <path d="M162 0H220a4 4 0 0 1 4 4V136a4 4 0 0 1-4 4H162z" fill="#6d7884" />
+      <path d="M174 0V140M190 0V140M206 0V140" stroke="#5b6570" strokeWidth="5" />
+      <path d="M34 112 96 60 132 30" fill="none" stroke="#c9d4df" strokeWidth="1" strokeDasharray="2 5" />
+      <circle cx="96" cy="60" r="12" fill="#eef2f6" />
+      <circle cx="96" cy="60" r="19" fill="none" stroke="#6fd19a" strokeWidth="2.5" />
+    </g>
+    <g transform="translate(252 0)">
+      <Double d="M72 64V100" />
+      <Double d="M72 128V164" />
+      <Double d="M112 178H134V50H112" />
+      <Box x={32} y={36} w={80} name="search" />
+      <Box x={32} y={100} w={80} name="follow" active />
+      <Box x={32} y={164} w={80} name="rest" />
+      <Circle x={72} y={64} />
+      <Circle x={72} y={100} />
+      <Circle x={72} y={128} />
+      <Circle x={72} y={164} />
+    </g>
+  </svg>
+);
+
+export const STARTER_PICTURES: Record<string, ReactNode> = { ball: Ball, two_nodes: Two, start_signal: Signal };
+
+/** For files, of which one knows nothing before they are opened. */
+export const CARD_PICTURES: ReactNode[] = [Mission, Two, Signal];

@@ -282,6 +282,8 @@ export interface FileRecord {
   changes: number;
   can_save: boolean | string;
   elsewhere: string;
+  /** The name of the graph. */
+  graph: string;
   journal: { changes: number; at: number } | null;
 }
 

@@ -1,5 +1,6 @@
 import { choose, enter, locked, redo, undo } from "../state/actions";
 import { layoutKey, change, useStudio, type View } from "../state/studio";
+import { isStart } from "../state/looking";
 import { nameOf } from "../state/paths";
 import { useOffers } from "../stage/offers";
 import { Icon } from "../ui/Icon";
@@ -7,17 +8,22 @@ import { Clock } from "./Clock";
 import { RunControl } from "./RunControl";
 
 export function TopBar() {
+  const start = useStudio(isStart);
   return (
     <header id="top">
       <Logo />
       <Crumbs />
       <FileName />
       <span className="spring" />
-      <RunControl />
-      <Clock />
-      <ActionsButton />
-      <span className="spring" />
-      <ViewSwitch />
+      {!start && (
+        <>
+          <RunControl />
+          <Clock />
+          <ActionsButton />
+          <span className="spring" />
+          <ViewSwitch />
+        </>
+      )}
       <button type="button" className="find" aria-label="Find or do anything" onClick={() => change({ popover: "commands" })}>
         <Icon name="find" />
         <span>Find or do anything</span>
@@ -70,7 +76,7 @@ function Logo() {
 /** Where I am; a dot says that there is activity inside. */
 function Crumbs() {
   const level = useStudio((s) => s.level);
-  const name = useStudio((s) => s.hello?.name ?? "no graph");
+  const name = useStudio((s) => (isStart(s) ? "no graph" : (s.tables.studio.file?.graph ?? "")));
   const since = useStudio((s) => s.activity.since);
   const parts = level === "" ? [] : level.split("/");
   const levels = ["", ...parts.map((_, index) => parts.slice(0, index + 1).join("/"))];

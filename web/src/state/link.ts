@@ -7,7 +7,6 @@ import { change, layoutKey, studio } from "./studio";
 export const socket = new Socket(address(), {
   hello(hello) {
     change({ hello, clockOffset: hello.now - Date.now() / 1000 });
-    if (hello.name) document.title = `${hello.name} · hfg studio`;
   },
   message: heard,
   heard() {

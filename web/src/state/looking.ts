@@ -1,6 +1,6 @@
 import type { NodeRecord, RunRecord, Tables, Value } from "../protocol/types";
 import { isInside } from "./paths";
-import type { Activity } from "./studio";
+import type { Activity, Studio } from "./studio";
 
 /** The innermost active node in a subgraph, of several the one that became active last. */
 export function activeInside(activity: Activity, path: string): string | null {
@@ -19,6 +19,10 @@ export function limitOf(node: NodeRecord | undefined): number | null {
   const limit = node?.options.active_for_s;
   return typeof limit === "number" ? limit : null;
 }
+
+/** Nothing is open, and nobody has begun anything. */
+export const isStart = (state: Studio): boolean =>
+  state.rev >= 0 && !state.begun && state.tables.studio.file?.kind === "none" && Object.keys(state.tables.nodes).length === 0;
 
 export const isRecording = (run: RunRecord | undefined): boolean => typeof run?.length_s === "number";
 

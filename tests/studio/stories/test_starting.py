@@ -1,0 +1,60 @@
+"""A person starts the studio without a graph: one click shows one that runs, and five steps explain it."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+import hfg
+from tests.studio.stories.bench import Story
+from tests.studio.stories.conftest import Open
+
+pytestmark = pytest.mark.slow
+
+STEPS = [
+    ("A node does one thing", "find"),
+    ("The orange outline is the state", None),
+    ("Draw a line from a port", "find"),
+    ("Change it while it runs", None),
+    ("When, and for how long", None),
+]
+
+
+@pytest.fixture
+def first(open_studio: Open) -> Story:
+    return open_studio(hfg.Graph("graph"))
+
+
+def test_one_click_shows_a_graph_that_runs_with_what_its_camera_sees(first: Story) -> None:
+    expect(first.page.locator("#top")).to_contain_text("no graph")
+    first.page.get_by_role("button", name="Run it").click()
+    first.bench.state("running")
+    first.bench.until(lambda: first.bench.is_active("search") or first.bench.is_active("follow"), "it is somewhere")
+    expect(first.page.locator(".crumbs")).to_contain_text("ball")
+    expect(first.page.locator("#canvas .node.active")).not_to_have_count(0)
+    expect(first.page.locator("#stage .caption")).to_contain_text("the ball was seen at")
+
+
+def test_the_tour_has_five_steps_each_next_to_what_it_is_about(first: Story) -> None:
+    first.page.get_by_role("button", name="Take the tour").click()
+    for title, node in STEPS:
+        step = first.page.get_by_role("dialog", name=title)
+        expect(step).to_be_visible()
+        if node is not None:
+            box, about = step.bounding_box(), first.node(node).bounding_box()
+            assert box is not None
+            assert about is not None
+            assert abs(box["x"] - about["x"] - about["width"]) < 60
+        step.get_by_role("button", name=re.compile("Next|Done")).click()
+    expect(first.page.get_by_role("dialog")).to_have_count(0)
+    expect(first.page.locator("#side h2").first).to_have_text("find")
+    first.bench.state("running")
+
+
+def test_a_small_starter_runs_as_soon_as_it_is_chosen(first: Story) -> None:
+    first.page.get_by_role("button", name="Wait for a start signal").click()
+    first.bench.state("running")
+    first.bench.until(lambda: first.bench.is_active("drive"), "the signal has come")
+    expect(first.node("drive")).to_be_visible()
