@@ -7,6 +7,7 @@
     targets      where an edge may lead, and why not               palette     node types that words and a wire fit
     viewing      one page: its frames, subscriptions, credits      budget      how much of the graph's time it may take
     topics       what pages subscribe to, with run_topics, sampled_topics (measures, timeline), tapped_topics (values)
+    waiting      which nodes wait, for what, and which edges are full
     showing      a value for people         logs       log records          conditions  of breakpoints, as data
     steering     the run: start, pause, steps, breakpoints         failing     what a run failed with
     layouts      where everything is drawn  clipboard  nodes as text

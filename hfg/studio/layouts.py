@@ -19,8 +19,9 @@ from hfg.graph.drawing.seen import Kind
 from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.paths import node_at
 from hfg.studio.tables import Tables
+from hfg.studio.viewing import Shown
 
-__all__ = ["Layouts", "key_of", "lay_out", "positions"]
+__all__ = ["Layouts", "lay_out", "positions"]
 
 _LOGGER: Final = Log("hfg.studio")
 
@@ -34,24 +35,19 @@ class _Host(Protocol):
     def take_layout(self, key: str, record: object) -> None: ...
 
 
-def key_of(path: str, view: str) -> str:
-    """Return the key of a layout in its table."""
-    return f"{view}:{path}"
-
-
 class Layouts:
     """Keeps the layouts that pages want as the graph is."""
 
     def __init__(self, host: _Host) -> None:
         self._host = host
-        self._wanted: set[tuple[str, str]] = set()
+        self._wanted: set[Shown] = set()
         self._made: dict[str, object] = {}  # by key: what the layout depends on
         self._working: asyncio.Task[None] | None = None
 
-    def want(self, levels: Iterable[tuple[str, str]]) -> None:
+    def want(self, levels: Iterable[Shown]) -> None:
         """These levels are shown, as the graph is now."""
         self._wanted = set(levels)
-        for key in [key for key in self._made if key not in {key_of(*one) for one in self._wanted}]:
+        for key in [key for key in self._made if key not in {one.key for one in self._wanted}]:
             del self._made[key]
             self._host.take_layout(key, None)
         if self._working is None and self._next() is not None:
@@ -63,37 +59,41 @@ class Layouts:
         if not task.cancelled() and task.exception() is not None:
             _LOGGER.error("a level cannot be laid out", exc_info=task.exception())
 
-    def _next(self) -> tuple[tuple[str, str], object] | None:
+    def _next(self) -> tuple[Shown, object] | None:
         """Return a level that is not drawn as it is, and what its layout depends on."""
         for level in sorted(self._wanted):
             cause = self._cause(level)
-            if self._made.get(key_of(*level)) != cause:
+            if self._made.get(level.key) != cause:
                 return level, cause
         return None
 
-    def _cause(self, level: tuple[str, str]) -> object:
-        """What a layout depends on: the records of the level."""
-        path, tables = level[0], self._host.tables.of
+    def _cause(self, level: Shown) -> object:
+        """What a layout depends on: the records of the level, or of all levels in it."""
+        path, tables = level.path, self._host.tables.of
         if path and path not in tables["nodes"]:
             return None
+
+        def is_seen(one: Any) -> bool:
+            return one.level == path or (level.deep and (not path or one.level.startswith(f"{path}/")))
+
         nodes = [
             (one.path, one.type, one.group, one.enabled, one.inside, one.options, one.notes.get("position"), one.ports)
             for one in tables["nodes"].values()
-            if one.level == path
+            if is_seen(one)
         ]
-        edges = [one for one in tables["edges"].values() if one.level == path]
-        return nodes, edges, [one for one in tables["gates"].values() if one.level == path]
+        edges = [one for one in tables["edges"].values() if is_seen(one)]
+        return nodes, edges, [one for one in tables["gates"].values() if is_seen(one)]
 
     async def _work(self) -> None:
         while (found := self._next()) is not None:
             level, cause = found
-            key = key_of(*level)
+            key = level.key
             if cause is None:
                 self._made[key] = None
                 self._host.take_layout(key, None)
                 continue
             try:
-                drawn = await asyncio.to_thread(lay_out, self._host.graph, *level)
+                drawn = await asyncio.to_thread(lay_out, self._host.graph, level)
             except Exception:
                 if self._cause(level) == cause:
                     self._made[key] = cause  # it will not do better the next time
@@ -114,13 +114,13 @@ def positions(level: Level) -> dict[str, tuple[float, float]]:
     return found
 
 
-def lay_out(graph: Graph, path: str, view: str) -> dict[str, Any]:
-    """Draw one level, its subgraphs closed."""
+def lay_out(graph: Graph, shown: Shown) -> dict[str, Any]:
+    """Draw one level with its subgraphs closed; or all levels in it, without the places that people chose."""
     root = level_of(graph)
-    level = root if not path else inside(node_at(root, path))
+    level = root if not shown.path else inside(node_at(root, shown.path))
     assert level is not None
-    kind = cast("Kind | None", view or None)
-    places = positions(level)
-    seen = View(kind, depth=0, all_ports=True, measured=True, places=places)
+    kind = cast("Kind | None", shown.view or None)
+    places = {} if shown.deep else positions(level)
+    seen = View(kind, depth=None if shown.deep else 0, all_ports=not shown.deep, measured=True, places=places)
     drawn: dict[str, Any] = msgspec.to_builtins(drawing.lay_out(level.face, seen))
-    return {**drawn, "level": path, "fixed": list(places)}
+    return {**drawn, "level": shown.path, "fixed": list(places), "deep": shown.deep}

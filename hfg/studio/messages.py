@@ -190,11 +190,12 @@ class Arrange(Request, frozen=True, tag="arrange"):
 
 
 class Level(_Message, frozen=True, tag="level"):
-    """The page shows a level, or no more."""
+    """The page shows a level, or no more; `deep` shows what is inside of its subgraphs, too."""
 
     path: Text
     open: bool = True
     view: Literal["", "activity", "mission", "all"] = ""
+    deep: bool = False
 
 
 class Ask(Request, frozen=True, tag="ask"):

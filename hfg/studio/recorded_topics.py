@@ -26,7 +26,23 @@ from hfg.studio.run_topics import RunTopic
 from hfg.studio.sampled_topics import packed
 from hfg.studio.showing import image_frame, number_in, shown_value
 from hfg.studio.spans import Ways
-from hfg.studio.topics import MOST_NODES, TOPICS, Args, Edges, Field, Nodes, Nothing, Path, Picture, Topics, View
+from hfg.studio.tapped_topics import Values
+from hfg.studio.topics import (
+    MOST_NODES,
+    MOST_VALUES,
+    TOPICS,
+    Args,
+    Edges,
+    Field,
+    Inside,
+    Nodes,
+    Nothing,
+    Path,
+    Paths,
+    Picture,
+    Topics,
+    View,
+)
 
 __all__ = ["RECORDED"]
 
@@ -245,8 +261,9 @@ class _Rates(_Topic):
         return b"".join(packed(self._sample(path, at)) for path in self._nodes)
 
     def _sample(self, path: str, at: int) -> Sample:
-        channels = [self.recorded.channels[port] for port in self.recorded.nodes.get(path, ())]
-        rate = max((self.seeking.count([one], at - _SECOND, at) for one in channels), default=0)
+        nodes = self.recorded.nodes
+        inner = [path] if path in nodes else [one for one in nodes if one.startswith(f"{path}/")]
+        rate = sum(max(self._count(port, at) for port in nodes[one]) for one in inner)
         return Sample(
             doing="signal",
             active=False,
@@ -259,6 +276,9 @@ class _Rates(_Topic):
             busy_share=0.0,
             newest_s=(),
         )
+
+    def _count(self, port: str, at: int) -> int:
+        return self.seeking.count([self.recorded.channels[port]], at - _SECOND, at)
 
 
 class _Window(Args, frozen=True):
@@ -331,7 +351,9 @@ RECORDED: Final[Topics] = {
     "flow": (Edges, lambda host, _: _Topic(host)),
     "node": (Path, lambda host, _: _Topic(host)),
     "load": (Nothing, lambda host, _: _Load(host)),
+    "waits": (Inside, lambda host, _: _Topic(host)),
     "value": (Path, lambda host, args: _Value(host, args.path)),
+    "values": (Paths, lambda host, args: Values(host, args.paths[:MOST_VALUES], _Value)),
     "image": (
         Picture,
         lambda host, args: _Image(host, args.path, min(max(args.size, 16), 2048), min(max(args.quality, 1), 100)),

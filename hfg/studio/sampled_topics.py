@@ -21,6 +21,7 @@ from hfg.studio.run_topics import RunTopic
 __all__ = ["Flows", "LoadTopic", "Measures", "NodeTopic", "SampledTopic", "TimelineTopic", "node_measures", "packed"]
 
 _FAR_S: Final = 0.5
+_INSIDE_S: Final = 0.25
 _MOST_BOXES: Final = 400
 """In a frame: more than can be seen in a tenth of a second; what else there was is counted."""
 
@@ -47,7 +48,7 @@ _IDLE: Final = ("signal", "unconnected", "start")
 
 
 class Measures(SampledTopic):
-    """The newest durations, the median and the rate of chosen nodes, packed."""
+    """The newest durations, the median and the rate of chosen nodes and subgraphs, packed."""
 
     kind = 1
 
@@ -56,18 +57,34 @@ class Measures(SampledTopic):
         self._nodes = nodes
         self._far: dict[str, NodeStatistics] = {}
         self._far_at = float("-inf")
+        self._subgraphs: dict[str, tuple[float, Sample | None]] = {}
 
     @override
     def attach(self, run: Run) -> None:
         super().attach(run)
         self._far, self._far_at = {}, float("-inf")
+        self._subgraphs.clear()
 
     @override
     def news(self) -> Any:
         if self.sampler is None:
             return None
         self.sampler.settle()
-        return b"".join(packed(self.sampler.node(path) or self._far_away(path)) for path in self._nodes)
+        return b"".join(packed(self._sampled(self.sampler, path)) for path in self._nodes)
+
+    def _sampled(self, sampler: Sampler, path: str) -> Sample | None:
+        return sampler.node(path) or self._far_away(path) or self._inside(sampler, path)
+
+    def _inside(self, sampler: Sampler, path: str) -> Sample | None:
+        """Return the sample of a subgraph; asked for four times per second, because it may have many nodes."""
+        now = self.time()
+        known = self._subgraphs.get(path)
+        if known is None or not 0 <= now - known[0] < _INSIDE_S:
+            nodes = self.host.tables.of["nodes"]
+            inner = [one for one, node in nodes.items() if one.startswith(f"{path}/") and not node.subgraph]
+            samples = [sample for one in inner if (sample := sampler.node(one)) is not None]
+            known = self._subgraphs[path] = now, _sum_of(samples) if samples else None
+        return known[1]
 
     def _far_away(self, path: str) -> Sample | None:
         """Return the last report about a node of another process; asked for twice per second."""
@@ -77,6 +94,20 @@ class Measures(SampledTopic):
             self._far, self._far_at = self.run.statistics().nodes, self.time()
         said = self._far.get(path)
         return None if said is None else _sample_of(said)
+
+
+def _sum_of(samples: list[Sample]) -> Sample:
+    """Return how all nodes inside of a subgraph are: durations of the busiest, rates and shares of all."""
+    busiest = max(samples, key=lambda one: one.busy_share)
+    return busiest._replace(
+        doing="working" if any(one.doing == "working" for one in samples) else "signal",
+        active=any(one.active for one in samples),
+        failed=sum(one.failed for one in samples),
+        done=sum(one.done for one in samples),
+        rate_hz=sum(one.rate_hz for one in samples),
+        active_share=max(one.active_share for one in samples),
+        busy_share=sum(one.busy_share for one in samples),
+    )
 
 
 def _sample_of(said: NodeStatistics) -> Sample:

@@ -17,10 +17,12 @@ from hfg.base.token import Token
 from hfg.engine.observing.encoding import encode, text
 from hfg.reporting.pictures import is_picture, png, smaller
 
-__all__ = ["image_frame", "number_in", "shown_value"]
+__all__ = ["image_frame", "kind_of", "number_in", "shown_value", "summary_of"]
 
 _MOST_BYTES: Final = 16_384
 _MOST_ELEMENTS: Final = 400
+_DEEPEST: Final = 2
+_MOST_FIELDS: Final = 4
 _SIZE: Final = struct.Struct("<HH")
 
 
@@ -31,8 +33,8 @@ def shown_value(token: Token[Any]) -> dict[str, Any]:
         "stamp": token.stamp,
         "number": token.sequence,
         "activity": token.activity,
-        "kind": _kind(token),
-        "summary": text(value),
+        "kind": kind_of(token),
+        "summary": summary_of(token),
         "data": None,
         "shape": None,
         "dtype": None,
@@ -61,7 +63,8 @@ def _too_much(value: np.ndarray[Any, Any]) -> str:
     return f"it has {value.size:,} elements, {shape}; a plot of its size or a node that chooses shows more"
 
 
-def _kind(token: Token[Any]) -> str:
+def kind_of(token: Token[Any]) -> str:
+    """Say in which way a page shows the value of a token."""
     value = token.value
     if token.is_marker:
         return "marker"
@@ -82,6 +85,48 @@ def _kind(token: Token[Any]) -> str:
     ):
         return "record"
     return "other"
+
+
+def summary_of(token: Token[Any]) -> str:
+    """Return the value of a token on one line, with numbers as short as people read them."""
+    try:
+        return _summary(token.value)
+    except Exception:  # of a value that cannot be looked into
+        return text(token.value)
+
+
+def _summary(value: Any) -> str:
+    if isinstance(value, np.ndarray) and value.size > _MOST_FIELDS:
+        size = " x ".join(map(str, value.shape[1::-1] + value.shape[2:])) if value.ndim > 1 else f"{value.size} numbers"
+        return f"image, {size}" if is_picture(value) else f"{value.dtype}, {size}"
+    return _short(value, 0)
+
+
+def _short(value: Any, depth: int) -> str:
+    if isinstance(value, bool | np.bool_) or value is None:
+        return str(value)
+    if isinstance(value, np.ndarray) and value.dtype.kind in "iuf":
+        few = value.size <= _MOST_FIELDS
+        return f"({', '.join(f'{one:.4g}' for one in value.flat)})" if few else f"{value.size} numbers"
+    if isinstance(value, float | np.floating):
+        return f"{value:.4g}"
+    if isinstance(value, str) and depth == 0:
+        return " ".join(value.split())
+    fields = _fields(value)
+    if fields and depth < _DEEPEST:
+        parts = [f"{name} {_short(one, depth + 1)}" for name, one in list(fields.items())[:_MOST_FIELDS]]
+        return ", ".join(parts) + (", …" if len(fields) > _MOST_FIELDS else "")
+    if isinstance(value, list | tuple) and value and _fields(value[0]):
+        return f"{len(value)} x {type(value[0]).__name__}"
+    return text(value)
+
+
+def _fields(value: Any) -> dict[str, Any]:
+    """Return the fields of a record by name; of anything else none."""
+    for names in ("_fields", "__struct_fields__", "__dataclass_fields__"):
+        if found := getattr(value, names, None):
+            return {str(name): getattr(value, name) for name in found}
+    return {}
 
 
 def number_in(value: object) -> float | None:

@@ -41,7 +41,7 @@ from hfg.studio.replaying import SENTENCE, Replay
 from hfg.studio.requests import answer
 from hfg.studio.steering import Steering
 from hfg.studio.topics import TOPICS, make_topic
-from hfg.studio.viewing import MOST_REQUESTS, MOST_SUBSCRIPTIONS, Outbox, Subscription, Viewer
+from hfg.studio.viewing import MOST_REQUESTS, MOST_SUBSCRIPTIONS, Outbox, Shown, Subscription, Viewer
 
 __all__ = ["Studio"]
 
@@ -143,14 +143,14 @@ class Studio(Following):
                     subscription.painted(seq)
             case Visible(on=on):
                 viewer.visible = on
-            case Level(path=path, open=is_open, view=view):
-                self._level(viewer, (path, view), is_open)
+            case Level(path=path, open=is_open, view=view, deep=deep):
+                self._level(viewer, Shown(path, view, deep), is_open)
             case Request():
                 self._request(viewer, message)
 
     def _join(self, viewer: Viewer, message: Join) -> None:
         missing = self.tables.since(message.rev) if message.boot == self.boot else None
-        viewer.levels.add(("", ""))
+        viewer.levels.add(Shown())
         if not self.is_described:
             self.refresh_all()
         if missing is None:
@@ -176,7 +176,7 @@ class Studio(Following):
         await asyncio.to_thread(self.project.look)
         self.singles_changed()
 
-    def _level(self, viewer: Viewer, level: tuple[str, str], is_open: bool) -> None:
+    def _level(self, viewer: Viewer, level: Shown, is_open: bool) -> None:
         if is_open and len(viewer.levels) < _MOST_LEVELS:
             viewer.levels.add(level)
         else:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
@@ -9,14 +11,15 @@ from typing_extensions import override
 
 from hfg.engine import Run
 from hfg.engine.observing.taps import Tap
+from hfg.errors import HfgError
 from hfg.reporting.pictures import is_picture
 from hfg.studio.conditions import part_of
 from hfg.studio.following import Following
 from hfg.studio.places import place_at
 from hfg.studio.run_topics import RunTopic
-from hfg.studio.showing import image_frame, number_in, shown_value
+from hfg.studio.showing import image_frame, kind_of, number_in, shown_value, summary_of
 
-__all__ = ["HistoryTopic", "ImageTopic", "TappedTopic", "ValueTopic"]
+__all__ = ["HistoryTopic", "ImageTopic", "TappedTopic", "ValueTopic", "Values"]
 
 _MOST_POINTS: Final = 2000
 _RATE_OVER_S: Final = 1.0
@@ -78,6 +81,52 @@ class ValueTopic(TappedTopic):
             return None
         token, rate, seen = self.tap.latest, self.rate(), self.tap.seen
         return lambda: {**shown_value(token), "rate_hz": rate, "seen": seen}
+
+
+class _Brief(TappedTopic):
+    """The newest value on one line."""
+
+    @override
+    def news(self) -> Any:
+        if not self.is_new() or self.tap is None or self.tap.latest is None:
+            return None
+        token = self.tap.latest
+        return lambda: {"kind": kind_of(token), "summary": summary_of(token)}
+
+
+class Values(RunTopic):
+    """The newest values of many ports, each on one line; those that have not changed are left out."""
+
+    most_hz = 4.0
+
+    def __init__(
+        self, host: Following, paths: Iterable[str], make: Callable[[Following, str], RunTopic] = _Brief
+    ) -> None:
+        super().__init__(host)
+        self._topics: dict[str, RunTopic] = {}
+        for path in paths:
+            with suppress(HfgError):  # nothing passes there
+                self._topics[path] = make(host, path)
+
+    @override
+    def take(self) -> Any:
+        found = {}
+        for path, topic in self._topics.items():
+            with suppress(HfgError):
+                if (value := topic.take()) is not None:
+                    found[path] = value
+        if not found:
+            return None
+        return lambda: {path: _line(make()) for path, make in found.items()}
+
+    @override
+    def close(self) -> None:
+        for topic in self._topics.values():
+            topic.close()
+
+
+def _line(value: Any) -> Any:
+    return None if value is None or value["kind"] in ("none", "marker") else value["summary"]
 
 
 class ImageTopic(TappedTopic):

@@ -1,6 +1,6 @@
 """Topics to which pages subscribe, by name. Each topic knows what is new; nothing is computed until a frame is due.
 
-Depends on `sampled_topics`, `tapped_topics` and `scenes`.
+Depends on `sampled_topics`, `waiting`, `tapped_topics` and `scenes`.
 """
 
 from __future__ import annotations
@@ -20,20 +20,24 @@ from hfg.studio.run_topics import RunTopic
 from hfg.studio.sampled_topics import Flows, LoadTopic, Measures, NodeTopic, TimelineTopic
 from hfg.studio.scenes import SceneTopic
 from hfg.studio.spans import Ways
-from hfg.studio.tapped_topics import HistoryTopic, ImageTopic, ValueTopic
+from hfg.studio.tapped_topics import HistoryTopic, ImageTopic, Values, ValueTopic
+from hfg.studio.waiting import WaitsTopic
 from hfg.trace import ActivityChanged, TraceEvent
 
 __all__ = [
     "MOST_NODES",
+    "MOST_VALUES",
     "TOPICS",
     "ActivityTopic",
     "Args",
     "Edges",
     "Field",
+    "Inside",
     "LogTopic",
     "Nodes",
     "Nothing",
     "Path",
+    "Paths",
     "Picture",
     "Topics",
     "View",
@@ -41,6 +45,7 @@ __all__ = [
 ]
 
 MOST_NODES: Final = 2000
+MOST_VALUES: Final = 200
 _MOST_MOVES: Final = 256
 _NEAR: Final = 8
 """How many changes of activity before one may be its cause."""
@@ -143,6 +148,18 @@ class Path(Args, frozen=True):
     path: str
 
 
+class Paths(Args, frozen=True):
+    """Paths of ports and edges."""
+
+    paths: list[str]
+
+
+class Inside(Args, frozen=True):
+    """A level: the path of a subgraph, "" for the whole graph."""
+
+    level: str = ""
+
+
 class Picture(Args, frozen=True):
     """A port or edge with pictures, and how large and good they are to be."""
 
@@ -173,7 +190,9 @@ TOPICS: Final[Topics] = {
     "flow": (Edges, lambda host, args: Flows(host, args.edges[:MOST_NODES])),
     "node": (Path, lambda host, args: NodeTopic(host, args.path)),
     "load": (Nothing, lambda host, _: LoadTopic(host)),
+    "waits": (Inside, lambda host, args: WaitsTopic(host, args.level)),
     "value": (Path, lambda host, args: ValueTopic(host, args.path)),
+    "values": (Paths, lambda host, args: Values(host, args.paths[:MOST_VALUES])),
     "image": (
         Picture,
         lambda host, args: ImageTopic(host, args.path, min(max(args.size, 16), 2048), min(max(args.quality, 1), 100)),

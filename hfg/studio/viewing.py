@@ -14,11 +14,30 @@ from hfg.errors import HfgError
 from hfg.studio.budget import Budget
 from hfg.studio.messages import HEADER, Data, Gone, encode
 
-__all__ = ["Frame", "Outbox", "Subscription", "Topic", "Viewer"]
+__all__ = ["Frame", "Outbox", "Shown", "Subscription", "Topic", "Viewer"]
 
 MOST_SUBSCRIPTIONS: Final = 256
 MOST_REQUESTS: Final = 100
 """Of one page that are not answered yet."""
+
+
+class Shown(NamedTuple):
+    """What a page shows of a graph.
+
+    Attributes:
+      path: of the subgraph, "" for the whole graph.
+      view: "activity", "mission", "all", or "" for the one that fits.
+      deep: what is inside of its subgraphs, too.
+    """
+
+    path: str = ""
+    view: str = ""
+    deep: bool = False
+
+    @property
+    def key(self) -> str:
+        """The key of its layout in the table of layouts."""
+        return f"{self.view}{'+' * self.deep}:{self.path}"
 
 
 class Frame(NamedTuple):
@@ -114,7 +133,7 @@ class Viewer:
       number: by which others know it.
       joined: it has the tables, and so gets every patch.
       visible: it is not in a hidden tab.
-      levels: what it shows: levels and views.
+      levels: what it shows.
       pending: requests that are not answered yet.
       budget: of its requests.
     """
@@ -123,7 +142,7 @@ class Viewer:
         self.number = number
         self.joined = False
         self.visible = True
-        self.levels: set[tuple[str, str]] = set()
+        self.levels: set[Shown] = set()
         self.pending = 0
         self.budget = Budget()
         self.subscriptions: dict[int, Subscription] = {}

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import logging
 import struct
 import time
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -465,3 +467,86 @@ def test_streams_together_have_a_small_share_of_the_loop(monkeypatch: pytest.Mon
         assert pauses[1] == pytest.approx(10.0)
 
     live(main)
+
+
+@hfg.node
+async def stuck(value: int) -> int:
+    """Never finish."""
+    await asyncio.Event().wait()
+    return value
+
+
+def held_up() -> hfg.Graph:
+    """A source whose numbers nobody takes, and next to it one that goes on."""
+    graph = hfg.Graph("held_up")
+    numbers, twice = graph.add(counting(), name="numbers"), graph.add(stuck(), name="stuck")
+    graph.connect(numbers.out, twice.value)
+    return graph
+
+
+@hfg.node
+def counting() -> Iterator[int]:
+    """Count."""
+    yield from itertools.count()
+
+
+def test_what_waits_is_reported_with_the_edge_that_holds_it_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hfg.studio.waiting._AFTER_S", 0.0)
+
+    async def main() -> None:
+        page = Page(studio_of(held_up())).join()
+        await page.ask("start", stay=True)
+        page.say(t="sub", sub=1, topic="waits", args={"level": ""})
+        while not values(page, 1):
+            beat(page)
+            await asyncio.sleep(0.01)
+        found = values(page, 1)[-1]
+        assert {path: says for path, (says, _) in found["nodes"].items()} == {"numbers": "waits until stuck took out"}
+        assert {key: full[:2] for key, full in found["edges"].items()} == {"numbers.out -> stuck.value": [1, 1]}
+        seen = len(values(page, 1))
+        beat(page, times=5)
+        assert len(values(page, 1)) == seen  # nothing is new
+        await page.studio.close()
+
+    live(main)
+
+
+def test_values_of_many_ports_come_together_and_only_those_that_are_new() -> None:
+    async def main() -> None:
+        page = Page(studio_of(ticking())).join()
+        await page.ask("start", stay=True)
+        run = page.studio.steering.run
+        assert run is not None
+        page.say(t="sub", sub=1, topic="values", args={"paths": ["clock.out", "count.call", "nobody.out"]})
+        await page.ask("trigger", path="clock.tick", value=7)
+        await run.wait_quiet()
+        beat(page)
+        await page.ask("trigger", path="count.call", value=8)
+        await run.wait_quiet()
+        beat(page)
+        assert values(page, 1) == [{"clock.out": "7", "count.call": "7"}, {"count.call": "8"}]
+        await page.studio.close()
+
+    live(main)
+
+
+def test_values_are_short_enough_for_one_line() -> None:
+    def line(value: Any) -> str:
+        return str(shown_value(Token(value))["summary"])
+
+    assert line(3.14159265) == "3.142"
+    assert line("two\nlines") == "two lines"
+    assert line(np.zeros((480, 640), np.uint8)) == "image, 640 x 480"
+    assert line(np.zeros((3, 4, 5))) == "float64, 4 x 3 x 5"
+    assert line(np.array([0.25, 2.0])) == "(0.25, 2)"
+    assert line(Reading(1.23456, np.zeros(9), "far")) == "level 1.235, rays 9 numbers, words 'far'"
+    assert line([Reading(1.0, np.zeros(9), "far")] * 3) == "3 x Reading"
+    assert line(True) == "True"
+
+
+class Reading(NamedTuple):
+    """A record."""
+
+    level: float
+    rays: Any
+    words: str

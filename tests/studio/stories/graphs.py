@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections.abc import Iterator
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Interval
@@ -22,6 +22,7 @@ __all__ = [
     "count",
     "fails_at",
     "halves",
+    "jam",
     "look",
     "mission",
     "picture",
@@ -194,4 +195,68 @@ def workshop() -> hfg.Graph:
     graph.start.activates(clock.begin)
     graph.connect(clock.tick, graph.add(Heard(), name="heard").hear)
     graph.add(Drive(), name="drive")
+    return graph
+
+
+@hfg.node
+async def stuck(value: int) -> int:
+    """Take a number, and never finish."""
+    await asyncio.Event().wait()
+    return value
+
+
+class Bell(hfg.Node):
+    """Ring for each number."""
+
+    value = hfg.Input(int)
+    ring = hfg.Event(int)
+
+    def process(self, value: int) -> None:
+        """Ring."""
+        self.ring.trigger(value)
+
+
+class Deaf(hfg.Node):
+    """Be busy with the first call for ever."""
+
+    @hfg.slot
+    async def hear(self, number: int) -> None:
+        """Be busy."""
+        await asyncio.Event().wait()
+
+
+class Pair(NamedTuple):
+    """Two numbers."""
+
+    left: int
+    right: int
+
+
+@hfg.node(outputs=Pair)
+def pair(value: int) -> Pair:
+    """Send a number and its half."""
+    return Pair(value, value // 2)
+
+
+@hfg.node
+def total(left: int, right: int) -> int:
+    """Add two numbers."""
+    return left + right
+
+
+def jam() -> hfg.Graph:
+    """A node that never finishes, a queue that is full, a node that is off; and two edges as a bundle."""
+    graph = hfg.Graph("jam")
+    numbers = graph.add(count(), name="numbers", max_rate_hz=25)
+    numbers >> graph.add(scaled(), name="scale") >> graph.add(stuck(), name="stuck")
+    other = graph.add(count(), name="other", max_rate_hz=25)
+    bell, deaf = graph.add(Bell(), name="bell"), graph.add(Deaf(), name="deaf")
+    graph.connect(other.out, bell.value)
+    graph.connect(bell.ring, deaf.hear, capacity=3)
+    third = graph.add(count(), name="third", max_rate_hz=25)
+    both, add = graph.add(pair(), name="both"), graph.add(total(), name="add")
+    third >> both
+    graph.connect(both.ports.outputs["left"], add.left)
+    graph.connect(both.ports.outputs["right"], add.right)
+    third >> graph.add(halves(), name="off", enabled=False)
     return graph

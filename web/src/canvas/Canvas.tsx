@@ -2,7 +2,10 @@ import "@xyflow/react/dist/base.css";
 import { Background, BackgroundVariant, ReactFlow, ReactFlowProvider, ViewportPortal } from "@xyflow/react";
 import { useMemo, useRef } from "react";
 import { change, layoutKey, useStudio } from "../state/studio";
+import type { LayoutRecord } from "../protocol/types";
 import { enter } from "../state/actions";
+import { isInside } from "../state/paths";
+import { counted, plural } from "../ui/words";
 import { AskedWires } from "./AskedWires";
 import { Annotations } from "./Annotations";
 import { FarOverlay } from "./FarOverlay";
@@ -37,7 +40,7 @@ function Inner() {
   const hands = useMemo(() => new Map(nodes.filter((one) => moved.has(one.id)).map((one) => [one.id, one.position])), [nodes, moved]);
   const view = useView(root, layout);
   const events = useCanvasEvents(spots, layout);
-  const classes = [view.level, wiring && "wiring", layout?.view === "activity" && "view-activity"];
+  const classes = [view.level, wiring && "wiring", view.partly && "partly", layout?.view === "activity" && "view-activity"];
   return (
     <main id="canvas" ref={root} className={classes.filter(Boolean).join(" ")} aria-label="Graph" tabIndex={-1} {...events}>
       <ReactFlow
@@ -57,7 +60,7 @@ function Inner() {
         onPaneClick={() => change({ selectedEdge: null, annotation: null, menu: null })}
         onMove={view.onMove}
         onMoveEnd={view.onMoveEnd}
-        minZoom={0.05}
+        minZoom={0.02}
         maxZoom={4}
         snapToGrid
         snapGrid={SNAP}
@@ -80,7 +83,7 @@ function Inner() {
               <Annotations layout={layout} kind="frame" moved={hands} />
             </div>
             <div className="under">
-              <Wires layout={layout} moved={moved} />
+              <Wires layout={layout} moved={moved} spots={spots} />
               <AskedWires layout={layout} spots={spots} />
               <MovedWires layout={layout} nodes={nodes} moved={moved} />
             </div>
@@ -93,7 +96,7 @@ function Inner() {
       </ReactFlow>
       <WireDrag spots={spots} />
       <ValueTip />
-      {layout?.view === "activity" && <ActivityLegend hidden={layout.hidden} />}
+      {layout?.view === "activity" && <ActivityLegend layout={layout} />}
       <Zoomer showAll={view.showAll} />
       {layout?.nodes.length === 0 && <p className="nothing-here">Nothing here yet. Press Tab to add a node, or drop a file.</p>}
     </main>
@@ -105,7 +108,9 @@ const SNAP: [number, number] = [8, 8];
 const MULTI = ["Control", "Meta", "Shift"];
 const PRO = { hideAttribution: false };
 
-function ActivityLegend({ hidden }: { hidden: number }) {
+/** What the lines of this view mean, and how much it leaves out. */
+function ActivityLegend({ layout }: { layout: LayoutRecord }) {
+  const all = useStudio((s) => Object.values(s.tables.edges).filter((one) => one.level === s.level || (layout.deep && isInside(one.level, s.level))).length);
   return (
     <div className="legend" style={{ right: 12, bottom: "auto", top: 12 }}>
       <span>
@@ -125,7 +130,9 @@ function ActivityLegend({ hidden }: { hidden: number }) {
         <i style={{ border: "2px solid var(--on)", background: "none" }} />
         active
       </span>
-      <span className="muted num">{hidden} edges hidden</span>
+      <span className="muted num">
+        {layout.hidden === 0 ? "no edges hidden" : `${counted(layout.hidden)} of ${plural(all, "edge")} hidden`}
+      </span>
     </div>
   );
 }

@@ -1,15 +1,24 @@
 import { useViewport } from "@xyflow/react";
 import type { LayoutRecord, NodeBox } from "../protocol/types";
 import { enter, show } from "../state/actions";
-import { activeInside } from "../state/looking";
-import { below } from "../state/paths";
+import { activeInside, groupClass } from "../state/looking";
+import { below, isInside } from "../state/paths";
 import { useStudio } from "../state/studio";
+import { counted, plural } from "../ui/words";
+
+interface At {
+  left: number;
+  top: number;
+  width: number;
+  height: number;
+}
 
 /** From far away a node is a block. What is active has at least 16 × 10 px of the screen, and a label that leads there. */
 export function FarOverlay({ layout }: { layout: LayoutRecord }) {
   const view = useViewport();
   const activity = useStudio((s) => s.activity);
-  const place = (box: NodeBox) => ({
+  const level = useStudio((s) => s.level);
+  const place = (box: NodeBox): At => ({
     left: box.x * view.zoom + view.x,
     top: box.y * view.zoom + view.y,
     width: box.width * view.zoom,
@@ -18,36 +27,71 @@ export function FarOverlay({ layout }: { layout: LayoutRecord }) {
   return (
     <>
       {layout.nodes.map((box) => {
+        const at = place(box);
         const inside = activeInside(activity, box.id);
         const active = box.id in activity.since || inside !== null;
-        const at = place(box);
-        if (!active) return box.kind === "subgraph" && at.width > 40 ? <FarName key={box.id} box={box} at={at} /> : null;
-        const width = Math.max(16, at.width);
-        const height = Math.max(10, at.height);
-        const left = at.left - (width - at.width) / 2;
-        const top = at.top - (height - at.height) / 2;
-        return (
-          <div key={box.id}>
-            <div className="far-active" style={{ left, top, width, height }} />
-            <button
-              type="button"
-              className="far-label"
-              style={{ left: left + width + 8, top: top + height / 2 - 10 }}
-              onClick={() => (inside ? show(inside) : enter(box.id))}
-            >
-              {inside ? `${box.name} › ${below(inside, box.id)}` : box.name}
-            </button>
-          </div>
-        );
+        if (box.is_open || !active) return box.kind === "subgraph" && <FarFrame key={box.id} box={box} at={at} active={active} />;
+        return <FarActive key={box.id} at={at} says={words(inside ?? box.id, level)} go={() => (inside ? show(inside) : layout.deep ? show(box.id) : enter(box.id))} />;
       })}
+      <FarLegend layout={layout} />
     </>
   );
 }
 
-function FarName({ box, at }: { box: NodeBox; at: { left: number; top: number } }) {
+/** The last two names on the way there: "visit › position". */
+const words = (path: string, level: string): string => below(path, level).split(" › ").slice(-2).join(" › ");
+
+function FarActive({ at, says, go }: { at: At; says: string; go: () => void }) {
+  const width = Math.max(16, at.width);
+  const height = Math.max(10, at.height);
+  const left = at.left - (width - at.width) / 2;
+  const top = at.top - (height - at.height) / 2;
   return (
-    <span className="far-name" style={{ left: at.left, top: at.top - 13 }}>
-      {box.name}
-    </span>
+    <div>
+      <div className="far-active" style={{ left, top, width, height }} />
+      <button type="button" className="far-label" style={{ left: left + width + 8, top: top + height / 2 - 10 }} onClick={go}>
+        {says}
+      </button>
+    </div>
+  );
+}
+
+/** A subgraph: its name if there is room, and its outline if one sees what is in it. */
+function FarFrame({ box, at, active }: { box: NodeBox; at: At; active: boolean }) {
+  return (
+    <>
+      {box.is_open && <div className={active ? "far-frame on" : "far-frame"} style={at} />}
+      {at.width > 40 && (
+        <span className={active ? "far-name on" : "far-name"} style={{ left: at.left, top: at.top - 13, maxWidth: at.width }}>
+          {box.name}
+        </span>
+      )}
+    </>
+  );
+}
+
+/** What the colours of the blocks mean. */
+function FarLegend({ layout }: { layout: LayoutRecord }) {
+  const tables = useStudio((s) => s.tables);
+  const since = useStudio((s) => s.activity.since);
+  const active = layout.nodes.filter((box) => !box.is_open && Object.keys(since).some((path) => path === box.id || isInside(path, box.id))).length;
+  const groups = Object.keys(tables.groups).filter((name) => layout.nodes.some((box) => (tables.nodes[box.id]?.group ?? box.group) === name));
+  const nodes = layout.nodes.filter((box) => !box.is_open).length;
+  return (
+    <div className="legend">
+      <span>
+        <i style={{ background: "var(--on)" }} />
+        active
+      </span>
+      {groups.map((name) => (
+        <span key={name}>
+          <i className={`swatch ${groupClass(tables, name)}`} style={{ margin: 0, width: 12, height: 12 }} />
+          {name}
+        </span>
+      ))}
+      <span className="muted num">
+        {plural(nodes, "node")}, {counted(active)} active
+      </span>
+    </div>
   );
 }

@@ -2,6 +2,7 @@ import { useEffect, useRef } from "react";
 import { paintMeasures } from "../live/measures";
 import type { Measure } from "../protocol/frames";
 import type { NodeBox } from "../protocol/types";
+import { useWaits } from "../live/waits";
 import { onTheme } from "../ui/colours";
 import { duration, percent, rate } from "../ui/words";
 import { drawBars } from "./bars";
@@ -12,37 +13,43 @@ interface Props {
   top: number;
   missing: string;
   failed: boolean;
+  off: boolean;
 }
 
+const OF_ALL_INSIDE = "Bars: the busiest node inside. Then how busy all inside are together, and how often they fire.";
+
 /** Bars, median and rate of a node. React draws them once; the figures are painted from outside of it. */
-export function MeasureRow({ box, top, missing, failed }: Props) {
+export function MeasureRow({ box, top, missing, failed, off }: Props) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const median = useRef<HTMLSpanElement>(null);
   const speed = useRef<HTMLSpanElement>(null);
   const extra = useRef<HTMLDivElement>(null);
   const helper = isHelper(box);
+  const isSubgraph = box.kind === "subgraph";
   const wide = helper ? 56 : isBig(box) ? 64 : Math.min(96, Math.max(40, box.width - 136));
   const tall = helper ? 14 : 16;
 
   useEffect(() => {
-    if (missing !== "") return;
+    if (missing !== "" || off) return;
     let last: Measure | null = null;
     const paint = (measure: Measure, slow: boolean) => {
       last = measure;
       if (canvas.current) drawBars(canvas.current, measure);
       if (!slow) return;
-      if (median.current) median.current.textContent = measure.count > 0 ? duration(measure.median) : "–";
-      if (speed.current) speed.current.textContent = rate(measure.rate);
-      if (extra.current) extra.current.textContent = more(measure);
+      if (median.current) median.current.textContent = measure.bars.length === 0 ? "–" : isSubgraph ? percent(measure.busyShare) : duration(measure.median);
+      if (speed.current) speed.current.textContent = measure.state === "working" && !(measure.rate > 0.05) ? "works" : rate(measure.rate);
+      if (extra.current) extra.current.textContent = more(measure, box.id);
     };
     if (canvas.current) drawBars(canvas.current, NOTHING);
     const stop = paintMeasures(box.id, paint);
     const unlisten = onTheme(() => last && paint(last, true));
+    const unwait = useWaits.subscribe(() => last && paint(last, true));
     return () => {
       stop();
       unlisten();
+      unwait();
     };
-  }, [box.id, missing]);
+  }, [box.id, isSubgraph, missing, off]);
 
   if (missing !== "") {
     return (
@@ -51,10 +58,17 @@ export function MeasureRow({ box, top, missing, failed }: Props) {
       </div>
     );
   }
+  if (off) {
+    return (
+      <div className="m" style={{ top }}>
+        disabled
+      </div>
+    );
+  }
   return (
     <>
       {!helper && <div className="xtra num" ref={extra} />}
-      <div className="m num" style={{ top }}>
+      <div className="m num" style={{ top }} title={isSubgraph ? OF_ALL_INSIDE : undefined}>
         <canvas ref={canvas} width={wide * 2} height={tall * 2} style={{ width: wide, height: tall }} />
         <span className="sp" />
         {failed ? <span className="fail">failed</span> : !helper && <span ref={median}>–</span>}
@@ -68,8 +82,9 @@ export function MeasureRow({ box, top, missing, failed }: Props) {
 
 const NOTHING: Measure = { state: "idle", active: false, bars: new Float32Array(), count: 0, median: 0, p99: 0, rate: 0, activeShare: 0, busyShare: 0 };
 
-function more(measure: Measure): string {
-  const parts = [`99 % ${duration(measure.p99)}`, `active ${percent(measure.activeShare)}`];
-  if (measure.state === "waiting") parts.push("waits");
+function more(measure: Measure, path: string): string {
+  const parts = measure.count === 0 ? ["has not fired yet"] : [`99 % ${duration(measure.p99)}`, `active ${percent(measure.activeShare)}`];
+  const waits = useWaits.getState().nodes[path];
+  if (waits) parts.push(waits[0]);
   return parts.join(" · ");
 }

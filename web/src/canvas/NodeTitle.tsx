@@ -1,3 +1,4 @@
+import { useWaits } from "../live/waits";
 import { rename } from "../state/actions";
 import { change, useStudio } from "../state/studio";
 import type { NodeBox, NodeRecord } from "../protocol/types";
@@ -20,6 +21,7 @@ export function NodeTitle({ box, record, top, plain }: Props) {
       {!plain && (
         <>
           <span className="sp" />
+          <WaitBadge path={box.id} />
           {box.badges.map((badge) =>
             badge.kind === "gate" ? (
               <GateBadge key={`g${badge.by}${badge.says}`} says={badge.says} by={badge.by || box.id} own={badge.says === ""} />
@@ -38,6 +40,17 @@ export function NodeTitle({ box, record, top, plain }: Props) {
         </>
       )}
     </div>
+  );
+}
+
+/** A node that has stood still for a second: what it waits for. */
+function WaitBadge({ path }: { path: string }) {
+  const says = useWaits((s) => s.nodes[path]?.[0]);
+  if (says === undefined) return null;
+  return (
+    <span className="badge waits" title={says} aria-label={says} role="img">
+      <Icon name="hourglass" />
+    </span>
   );
 }
 

@@ -60,6 +60,7 @@ function NodeViewPlain({ data }: NodeProps<HfgNode>) {
     !look.selected && look.within && "within",
     record?.enabled === false && "off",
     record?.missing && "missing",
+    box.is_open && "open",
   ];
   const far = useZoom((s) => s.level === "far");
   const label = `${box.name}, ${look.active ? "active, " : ""}${box.type_name}, group ${record?.group ?? box.group}`;
@@ -76,16 +77,16 @@ function NodeViewPlain({ data }: NodeProps<HfgNode>) {
 /** What one sees of a node that is not far away. */
 function NodeInside({ box, look, plain, record }: { box: NodeBox; look: Look; plain: boolean; record: NodeRecord | undefined }) {
   const rows = rowsOf(box);
-  const top = plain && !look.inside ? box.height / 2 - 10 : rows.title;
+  const top = box.is_open ? 2 : plain && !look.inside ? box.height / 2 - 10 : rows.title;
   return (
     <>
       <i className="stripe" />
       {look.brk && <i className={look.brk.holds ? "brk holds" : "brk"} title="The run pauses here (F9)" />}
       <NodeTitle box={box} record={record} top={top} plain={plain} />
-      {look.inside !== null ? (
+      {box.is_open ? null : look.inside !== null ? (
         <WhereLine path={box.id} inside={look.inside} top={rows.measure} />
       ) : (
-        !plain && <MeasureRow box={box} top={rows.measure} missing={record?.missing ?? ""} failed={look.failed} />
+        !plain && <MeasureRow box={box} top={rows.measure} missing={record?.missing ?? ""} failed={look.failed} off={record?.enabled === false} />
       )}
     </>
   );

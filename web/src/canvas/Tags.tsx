@@ -19,6 +19,7 @@ export function Tags({ layout }: { layout: LayoutRecord }) {
           style={{ left: tag.x, top: tag.y, width: tag.width, height: tag.height }}
           data-port={tag.ports.length === 1 ? innerPort(level, tag.ports[0]!) : undefined}
           data-kind={tag.kind}
+          title={tag.ports.length > 1 ? tag.ports.join(", ") : undefined}
           onPointerEnter={() => setLit(tag.ports)}
           onPointerLeave={() => setLit([])}
         >

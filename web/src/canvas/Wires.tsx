@@ -1,25 +1,39 @@
-import { memo, useEffect, useRef } from "react";
+import { memo, useEffect, useRef, useState } from "react";
 import { onPulse, PULSE_MS } from "../live/activity";
 import type { LayoutLine, LayoutRecord } from "../protocol/types";
+import { useWaits, type Full } from "../live/waits";
 import { edgeKey, nodeOf } from "../state/paths";
 import { useStudio } from "../state/studio";
-import { pointsDown, rounded, tipOf } from "./geometry";
+import { middleOf, pointsDown, rounded, tipOf } from "./geometry";
+import { type Strand, spread } from "./spreading";
+import { useZoom } from "./useView";
+import type { Spot } from "./wiring";
 
 export const keysOf = (line: LayoutLine): string[] => line.edges.map((edge) => edgeKey(edge.source, edge.target));
 
 /** All lines of a level, exactly as the layout routes them: data below, activity above, its last way on top. */
-export function Wires({ layout, moved }: { layout: LayoutRecord; moved: ReadonlySet<string> }) {
+export function Wires({ layout, moved, spots }: { layout: LayoutRecord; moved: ReadonlySet<string>; spots: ReadonlyMap<string, Spot> }) {
   const ways = useStudio((s) => s.activity.ways);
   const picked = useStudio((s) => s.insertAt ?? s.selectedEdge);
   const nodes = useStudio((s) => s.tables.nodes);
+  const full = useWaits((s) => s.edges);
+  const near = useZoom((s) => s.level === "near");
+  const selection = useStudio((s) => s.selection);
+  const [over, setOver] = useState<string | null>(null);
   const lines = layout.lines.filter((line) => !line.edges.some((e) => moved.has(nodeOf(e.source)) || moved.has(nodeOf(e.target))));
   const draw = (line: LayoutLine) => {
     const keys = keysOf(line);
     const off = line.edges.some((e) => nodes[nodeOf(e.source)]?.enabled === false || nodes[nodeOf(e.target)]?.enabled === false);
+    const id = keys.join();
+    const chosen = near && line.edges.some((e) => selection.has(nodeOf(e.source)) || selection.has(nodeOf(e.target)));
+    const strands = line.edges.length > 1 && !line.tag && layout.view !== "activity" && (over === id || chosen) ? spread(line, spots) : NO_STRANDS;
     return (
       <Wire
-        key={keys.join()}
+        key={id}
         line={line}
+        strands={strands}
+        over={setOver}
+        full={keys.map((key) => full[key]).find(Boolean)}
         hot={line.is_active && keys.some((key) => ways.has(key))}
         picked={picked !== null && keys.includes(picked)}
         off={off}
@@ -39,24 +53,37 @@ export function Wires({ layout, moved }: { layout: LayoutRecord; moved: Readonly
   );
 }
 
+const NO_STRANDS: Strand[] = [];
+
 interface WireProps {
   line: LayoutLine;
+  /** The edges of a bundle one by one, while it is spread. */
+  strands: Strand[];
+  over: (id: string | null) => void;
+  full: Full | undefined;
   hot: boolean;
   picked: boolean;
   off: boolean;
   plain: boolean;
 }
 
-const Wire = memo(function Wire({ line, hot, picked, off, plain }: WireProps) {
+const Wire = memo(function Wire({ line, strands, over, full, hot, picked, off, plain }: WireProps) {
   const path = rounded(line.points, plain ? 9 : 7);
   const ends = new Set(line.edges.flatMap((edge) => [nodeOf(edge.source), nodeOf(edge.target)]));
   const more = `${hot ? " hot" : ""}${picked ? " picked" : ""}${off ? " off" : ""}`;
+  const isSpread = strands.length > 0;
   const bundle = line.edges.length > 1;
   const flow = plain ? `activity-data${line.kind === "signal" ? " dash" : ""}` : line.kind === "signal" ? (bundle ? "sigb" : "sig") : bundle ? "data bundle" : "data";
   const sync = line.kind === "data" ? " sync" : "";
   const joint = line.is_active ? `joint${hot ? " hot" : ""}` : "jointd";
   return (
-    <g className="wire-group" data-ends={[...ends].join(" ")} data-edges={keysOf(line).join("\n")}>
+    <g
+      className={isSpread ? "wire-group spread" : "wire-group"}
+      data-ends={[...ends].join(" ")}
+      data-edges={keysOf(line).join("\n")}
+      onPointerEnter={bundle ? () => over(keysOf(line).join()) : undefined}
+      onPointerLeave={bundle ? () => over(null) : undefined}
+    >
       <path className="wire halo" d={path} style={line.is_active ? { strokeWidth: plain ? 10 : 9 } : undefined} />
       {line.is_active ? (
         <>
@@ -67,7 +94,7 @@ const Wire = memo(function Wire({ line, hot, picked, off, plain }: WireProps) {
       ) : (
         <>
           <path className={`wire ${flow}${more}`} d={path} />
-          {(plain || pointsDown(line.points)) && !bundle && <path className={plain ? "tip sync" : "tip d"} d={tipOf(line.points)} />}
+          {(plain || pointsDown(line.points)) && !bundle && !full && <path className={plain ? "tip sync" : "tip d"} d={tipOf(line.points)} />}
         </>
       )}
       {line.combs.map((comb) => (
@@ -78,10 +105,34 @@ const Wire = memo(function Wire({ line, hot, picked, off, plain }: WireProps) {
       ))}
       {line.count_at && bundle && <Count at={line.count_at} count={line.edges.length} />}
       {line.says !== "" && line.says_at && <Words x={line.says_at[0]} y={line.says_at[1]} text={line.says} plain={plain} />}
-      <path className="wire hit" d={path} />
+      <path className="wire hit" d={path} style={isSpread ? { strokeWidth: 12 + 7 * strands.length } : undefined} />
+      {strands.map((one) => (
+        <g key={one.key} data-edges={one.key}>
+          <path className="wire halo" d={rounded(one.points)} />
+          <path className={`wire ${line.is_active ? `act${sync}` : line.kind === "signal" ? "sig" : "data"} strand`} d={rounded(one.points)} />
+          <path className="wire hit" d={rounded(one.points)} />
+        </g>
+      ))}
+      {full && <FullMark line={line} full={full} />}
     </g>
   );
 });
+
+/** Nobody takes what is on the edge: the tip is red, and how much is there stands on the line. */
+function FullMark({ line, full: [tokens, places] }: { line: LayoutLine; full: Full }) {
+  const [x, y] = middleOf(line.points);
+  const says = `${tokens} of ${places}`;
+  const wide = 12 + 6 * says.length;
+  return (
+    <g className="full-mark" aria-label={`full, ${says}`}>
+      <path className="tip blocked" d={tipOf(line.points)} />
+      <rect className="count-pill" x={x - wide / 2} y={y - 8} width={wide} height="16" rx="8" />
+      <text className="wlabel" x={x} y={y + 4} textAnchor="middle">
+        {says}
+      </text>
+    </g>
+  );
+}
 
 function Count({ at, count }: { at: readonly [number, number]; count: number }) {
   return (

@@ -1,12 +1,13 @@
 import { MiniMap, useReactFlow, useStore } from "@xyflow/react";
 import { useMemo } from "react";
-import { arrange } from "../state/actions";
+import { arrange, openAll } from "../state/actions";
 import { studio, useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
 import type { HfgNode } from "./NodeView";
 
 export function Zoomer({ showAll }: { showAll: () => void }) {
   const flow = useReactFlow();
+  const deep = useStudio((s) => s.deep[s.level] ?? false);
   const percent = useStore((s) => Math.round(s.transform[2] * 100));
   return (
     <div className="zoomer">
@@ -22,6 +23,9 @@ export function Zoomer({ showAll }: { showAll: () => void }) {
       <button type="button" className="btn" aria-label="Show all (Home)" title="Show all (Home)" onClick={showAll}>
         <Icon name="fit" />
       </button>
+      <button type="button" className={deep ? "btn sel" : "btn"} aria-pressed={deep} aria-label="Open all subgraphs (U)" title="Open all subgraphs (U)" onClick={openAll}>
+        <Icon name="nested" />
+      </button>
       <button type="button" className="btn" aria-label="Lay out" title="Lay out all, or the selection" onClick={() => void arrange(null)}>
         <Icon name="layout" />
       </button>
@@ -32,6 +36,7 @@ export function Zoomer({ showAll }: { showAll: () => void }) {
 const GROUP_COLOURS = ["var(--line2)", "var(--g1)", "var(--g2)", "var(--g3)", "var(--g4)"];
 
 function miniColour(node: HfgNode, since: Readonly<Record<string, number>>): string {
+  if (node.data.box.is_open) return "transparent";
   const { tables } = studio();
   const path = node.id;
   if (Object.keys(since).some((one) => one === path || one.startsWith(`${path}/`))) return "var(--on)";

@@ -1,6 +1,6 @@
 import type { LayoutRecord } from "../protocol/types";
 import { describe, expect, it } from "vitest";
-import { allInView, boundsOf, firstView, rounded, tipOf, zoomOf } from "./geometry";
+import { allInView, boundsOf, firstView, middleOf, rounded, tipOf, zoomOf } from "./geometry";
 
 describe("lines", () => {
   it("have rounded corners that are no larger than half of a side", () => {
@@ -42,4 +42,9 @@ describe("the first view of a level", () => {
   it("is far, middle or near", () => {
     expect([0.44, 0.45, 1.25, 1.26].map(zoomOf)).toEqual(["far", "middle", "middle", "near"]);
   });
+});
+
+it("a mark lies on the longest part of a line", () => {
+  expect(middleOf([[0, 0], [10, 0], [10, 60], [30, 60]])).toEqual([10, 30]);
+  expect(middleOf([[4, 5]])).toEqual([4, 5]);
 });

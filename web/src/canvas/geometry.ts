@@ -33,6 +33,20 @@ export const pointsDown = (points: readonly Point[]): boolean => {
   return p !== undefined && q !== undefined && p[0] === q[0] && q[1] > p[1];
 };
 
+/** The middle of the longest part of a line. */
+export function middleOf(points: readonly Point[]): Point {
+  let best: Point = points[0] ?? [0, 0];
+  let longest = -1;
+  for (let index = 1; index < points.length; index++) {
+    const [p, q] = [points[index - 1]!, points[index]!];
+    const length = Math.abs(q[0] - p[0]) + Math.abs(q[1] - p[1]);
+    if (length <= longest) continue;
+    longest = length;
+    best = [(p[0] + q[0]) / 2, (p[1] + q[1]) / 2];
+  }
+  return best;
+}
+
 /** The line that follows the mouse. */
 export function loose(from: Point, to: Point, upright: boolean): string {
   const bend = Math.max(24, Math.min(120, Math.hypot(to[0] - from[0], to[1] - from[1]) / 2));
@@ -78,6 +92,6 @@ export function firstView(box: Box, canvasWidth: number, canvasHeight: number) {
 }
 
 export function allInView(box: Box, canvasWidth: number, canvasHeight: number) {
-  const zoom = Math.max(0.08, Math.min(1, (canvasWidth - 48) / Math.max(1, box.width), (canvasHeight - 48) / Math.max(1, box.height)));
+  const zoom = Math.max(0.02, Math.min(1, (canvasWidth - 48) / Math.max(1, box.width), (canvasHeight - 48) / Math.max(1, box.height)));
   return { x: (canvasWidth - box.width * zoom) / 2 - box.x * zoom, y: (canvasHeight - box.height * zoom) / 2 - box.y * zoom, zoom };
 }

@@ -19,7 +19,8 @@ function made(layout: LayoutRecord, selection: ReadonlySet<string>): HfgNode[] {
     selected: selection.has(box.id),
     deletable: false,
     connectable: false,
-    draggable: layout.view !== "activity" && box.kind !== "feed",
+    draggable: layout.view !== "activity" && !layout.deep && box.kind !== "feed",
+    ...(box.is_open ? { style: { pointerEvents: "none" as const } } : {}), // what lies in it is reached through it
     ariaLabel: box.name,
   }));
 }

@@ -55,7 +55,7 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
     const element = root.current;
     if (!layout || !element || shown.current === key(layout)) return;
     shown.current = key(layout);
-    const view = kept.get(key(layout)) ?? firstView(boundsOf(layout), element.clientWidth, element.clientHeight);
+    const view = kept.get(key(layout)) ?? (layout.deep ? allInView : firstView)(boundsOf(layout), element.clientWidth, element.clientHeight);
     void flow.setViewport(view);
     settle(view);
     setPartly(isPartly(layout, view, element));
@@ -87,7 +87,7 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
   return { level, partly, onMove, onMoveEnd, showAll };
 }
 
-const key = (layout: LayoutRecord | undefined): string => (layout ? `${studio().tables.studio.file?.graph}:${studio().tables.studio.file?.path}:${studio().level}:${layout.view}` : "");
+const key = (layout: LayoutRecord | undefined): string => (layout ? `${studio().tables.studio.file?.graph}:${studio().tables.studio.file?.path}:${studio().level}:${layout.view}:${layout.deep}` : "");
 
 function isPartly(layout: LayoutRecord | undefined, view: Viewport, element: HTMLElement | null): boolean {
   if (!layout || !element) return false;

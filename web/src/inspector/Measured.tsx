@@ -3,8 +3,10 @@ import { drawBars } from "../canvas/bars";
 import { paintMeasures } from "../live/measures";
 import type { NodeMeasures } from "../protocol/types";
 import { socket } from "../state/link";
-import { useStudio } from "../state/studio";
-import { isRecording } from "../state/looking";
+import { useWaits } from "../live/waits";
+import { elapsed, isRecording } from "../state/looking";
+import { studio, useStudio } from "../state/studio";
+import { Icon } from "../ui/Icon";
 import { counted, duration } from "../ui/words";
 
 export function Measured({ path }: { path: string }) {
@@ -24,7 +26,6 @@ export function Measured({ path }: { path: string }) {
   }, [path]);
 
   if (!runs || isSubgraph) return null;
-  const waits = Object.entries(facts?.waiting ?? {}).sort((a, b) => b[1] - a[1])[0];
   return (
     <div className="sec">
       <h3>
@@ -38,13 +39,32 @@ export function Measured({ path }: { path: string }) {
         <Fact name="median" value={duration(facts?.p50_s)} />
         <Fact name="99 %" value={duration(facts?.p99_s)} />
       </dl>
-      {facts?.doing && (
-        <p className="second num" style={{ margin: "4px 0" }}>
-          {facts.doing}
-          {waits && waits[1] > 1 ? ` · waits for ${waits[0]}, for ${waits[1].toFixed(1)} s` : ""}
-        </p>
-      )}
+      <Waiting path={path} />
     </div>
+  );
+}
+
+/** What the node waits for, and for how long at least: the studio looks twice a second. */
+function Waiting({ path }: { path: string }) {
+  const wait = useWaits((s) => s.nodes[path]);
+  const text = useRef<HTMLSpanElement>(null);
+  useEffect(() => {
+    if (!wait) return;
+    const paint = () => {
+      const state = studio();
+      const spent = Math.max(0, elapsed(state.tables.studio.run, state.clockOffset) - wait[1]);
+      if (text.current) text.current.textContent = `${wait[0]}, for at least ${spent.toFixed(1)} s`;
+    };
+    paint();
+    const timer = setInterval(paint, 250);
+    return () => clearInterval(timer);
+  }, [wait]);
+  if (!wait) return null;
+  return (
+    <p className="second num row" style={{ margin: "4px 0", gap: 6 }}>
+      <Icon name="hourglass" />
+      <span ref={text} />
+    </p>
   );
 }
 

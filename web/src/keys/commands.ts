@@ -114,6 +114,7 @@ export const DOINGS: Doing[] = [
   { name: "View: activity", keys: "1", run: view("activity") },
   { name: "View: mission", keys: "2", run: view("mission") },
   { name: "View: all edges", keys: "3", run: view("all") },
+  { name: "Open all subgraphs, or close them", keys: "U", run: act.openAll },
   { name: "Follow live", keys: "L", run: followOrNot },
   { name: "To the change of activity before", keys: "[", run: () => toActivityChange(-1) },
   { name: "To the change of activity after", keys: "]", run: () => toActivityChange(1) },

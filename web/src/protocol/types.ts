@@ -221,6 +221,8 @@ export interface LayoutRecord {
   lines: LayoutLine[];
   groups: string[];
   hidden: number;
+  /** With what is inside of its subgraphs. */
+  deep: boolean;
 }
 
 export interface ProblemRecord {

@@ -84,6 +84,13 @@ export function choose(view: View): void {
   showLevel();
 }
 
+/** Shows what is inside of all subgraphs of the level, or closes them. */
+export function openAll(): void {
+  const { level, deep } = studio();
+  change({ deep: { ...deep, [level]: !deep[level] } });
+  showLevel();
+}
+
 export function select(paths: Iterable<string>): void {
   change({ selection: new Set(paths), selectedEdge: null, annotation: null });
 }

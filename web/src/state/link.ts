@@ -30,7 +30,7 @@ export const socket = new Socket(address(), {
 
 let boot: string | null = null;
 /** Levels that the studio lays out for this page, the one that is shown last: who comes back finds them as they are. */
-let opened: { path: string; view: string }[] = [];
+let opened: { path: string; view: string; deep: boolean }[] = [];
 const KEPT_LEVELS = 8;
 
 function address(): string {
@@ -65,8 +65,8 @@ function keepLevel(): void {
 /** Tells the studio which level and view it is to lay out. */
 export function showLevel(): void {
   const state = studio();
-  const wanted = { path: state.level, view: state.views[state.level] ?? "" };
-  const same = (one: typeof wanted) => one.path === wanted.path && one.view === wanted.view;
+  const wanted = { path: state.level, view: state.views[state.level] ?? "", deep: state.deep[state.level] ?? false };
+  const same = (one: typeof wanted) => one.path === wanted.path && one.view === wanted.view && one.deep === wanted.deep;
   if (opened.length > 0 && same(opened.at(-1)!)) return;
   if (!opened.some(same) && !socket.send({ t: "level", ...wanted, open: true })) return;
   opened = [...opened.filter((one) => !same(one)), wanted];

@@ -58,6 +58,8 @@ export interface Studio {
   tables: Tables;
   level: string;
   views: Readonly<Record<string, View>>;
+  /** Levels of which the inside of all subgraphs is shown. */
+  deep: Readonly<Record<string, boolean>>;
   selection: ReadonlySet<string>;
   selectedEdge: string | null;
   /** The note or frame that is selected, and the one that is being written. */
@@ -116,6 +118,7 @@ export const useStudio = create<Studio>()(() => ({
   tables: EMPTY,
   level: "",
   views: {},
+  deep: {},
   selection: new Set<string>(),
   selectedEdge: null,
   annotation: null,
@@ -148,4 +151,4 @@ export const studio = useStudio.getState;
 export const change = useStudio.setState;
 
 /** The layout that the page shows: that of the chosen view, or of the level's own. */
-export const layoutKey = (state: Studio): string => `${state.views[state.level] ?? ""}:${state.level}`;
+export const layoutKey = (state: Studio): string => `${state.views[state.level] ?? ""}${state.deep[state.level] ? "+" : ""}:${state.level}`;

@@ -26,6 +26,7 @@ const PATHS = {
   close: '<path d="M4 4l8 8M12 4l-8 8"/>',
   enter: '<path d="M9 3h4v10H9M3 8h7M7 5l3 3-3 3"/>',
   fit: '<path d="M2 6V2h4M14 6V2h-4M2 10v4h4M14 10v4h-4"/>',
+  nested: '<rect x="1.5" y="2" width="13" height="12" rx="1.5"/><path d="M4 5h3v2.500H4zM9 8.500h3V11H9zM7 6.250h3.500V8.500"/>',
   down: '<path d="M4 6l4 4 4-4"/>',
   right: '<path d="M6 4l4 4-4 4"/>',
   ok: '<path d="M3 8.5l3.5 3.5L13 4.5"/>',
