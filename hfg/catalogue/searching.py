@@ -37,6 +37,10 @@ _ALIKE: Final = 0.75
 """How much less a word of the same meaning counts than the word itself."""
 _RELATED: Final = 0.5
 """How much less a word counts that only starts in the same way, as "detector" and "detection"."""
+_BEGUN: Final = 0.6
+"""How much less a word counts that only starts with the letters typed so far."""
+_AMID: Final = 0.2
+"""How much less a name counts that has these letters somewhere else."""
 _FEWEST_LETTERS: Final = 5
 _WORST: Final = 0.2
 """Results are left out whose score is less than this part of the best one's."""
@@ -165,10 +169,18 @@ class _Found(NamedTuple):
     weight: float
 
 
-def ranked(index: Index, words: str) -> list[int]:
-    """Return the numbers of the entries that the words describe, best first."""
+def ranked(index: Index, words: str, *, typing: bool = False) -> list[int]:
+    """Return the numbers of the entries that the words describe, best first.
+
+    Args:
+      index: the words of the entries.
+      words: to search for.
+      typing: the user is typing, so the word at the end may be incomplete: "thr" finds "threshold".
+    """
     wanted = _wanted(words)
     found = _all_found(index, wanted)
+    if typing and wanted:
+        _complete(index, _telling(words)[-1], found[-1])
     whole = sum(one.weight for one in found)
     scores: dict[int, float] = {}
     for number in {number for one in found for number in one.scores}:
@@ -221,6 +233,30 @@ def _found(index: Index, wanted: Sequence[str], place: int) -> _Found:
     if not scores:
         weight = math.log(1 + len(index.entries))  # an unknown word weighs as much as the rarest
     return _Found(scores, weight)
+
+
+def _complete(index: Index, letters: str, found: _Found) -> None:
+    """Let words count that start with these letters, and words that mean the same as those."""
+    if len(letters) < _FEWEST_TYPED:
+        return
+    for word in index.words.keys() | _spoken():
+        if not word.startswith(letters) or word == letters:
+            continue
+        stem = index.words.get(word) or _stemmed(word)
+        _add(found.scores, _scored(index, stem), _BEGUN)
+        for phrase in _thesaurus().get((stem,), ()):
+            if len(phrase) == 1:
+                _add(found.scores, _scored(index, phrase[0]), _BEGUN * _ALIKE)
+    whole = math.log(1 + len(index.entries)) * _NAME
+    for number, entry in enumerate(index.entries):
+        name = entry.title.lower()
+        if letters in name:  # of two names, the shorter one has more of it
+            share = _BEGUN if any(one.startswith(letters) for one in _split(entry.title)) else _AMID
+            score = whole * share * (1 + len(letters) / len(name))
+            found.scores[number] = max(found.scores.get(number, 0.0), score)
+
+
+_FEWEST_TYPED: Final = 2
 
 
 def _relatives(index: Index, stem: str) -> list[str]:

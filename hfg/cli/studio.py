@@ -74,7 +74,7 @@ def studio(
     if attach is not None:
         return _attach(attach, target, options, browser, read_only=read_only)
     if target is not None and target.endswith(".mcap"):
-        return _look_at(target, into, arg, allow, options, browser, at_once=run)
+        return _look_at(target, into, arg, allow, options, browser, at_once=run, read_only=_why(read_only))
     if into is not None:
         raise TargetError(f'--into names the graph of a recording, so "{into}" means nothing here; leave it out')
     graph = Graph("graph") if target is None else load_graph(target, arg or [], allow)
@@ -82,10 +82,13 @@ def studio(
     file = _file_of(target)
     folder = Path.cwd() if file is None else file.resolve().parent
     project = Project(graph, folder, file, allow=allow or (), read=lambda path: load_graph(str(path), [], allow))
-    why = "You may look, not change: the studio was started with --read-only." if read_only else ""
     _need_subgraph(graph, inside)
-    made = Studio(project, read_only=why, target=target or graph.name, level=inside)
+    made = Studio(project, read_only=_why(read_only), target=target or graph.name, level=inside)
     return _serve(made, options, browser, at_once=run)
+
+
+def _why(read_only: bool) -> str:
+    return "You may look, not change: the studio was started with --read-only." if read_only else ""
 
 
 def _need_subgraph(graph: Graph, path: str) -> None:
@@ -102,6 +105,7 @@ def _look_at(
     browser: bool,
     *,
     at_once: bool,
+    read_only: str,
 ) -> int:
     """Serve pages of a recording."""
     from hfg.studio.recorded import Recorded
@@ -111,8 +115,8 @@ def _look_at(
         recorded = Recorded(file, graph, allow=allow or ())
     except UsageError as error:
         raise TargetError(str(error)) from None
-    graph = recorded.graph_after(0)
-    return _serve(Studio(RecordedProject(graph, Path(file)), recorded=recorded), options, browser, at_once=at_once)
+    project = RecordedProject(recorded.graph_after(0), Path(file), allow=allow or ())
+    return _serve(Studio(project, recorded=recorded, read_only=read_only), options, browser, at_once=at_once)
 
 
 def _serve(made: Studio, options: Mapping[str, Any], browser: bool, *, at_once: bool) -> int:

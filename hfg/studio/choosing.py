@@ -174,7 +174,7 @@ _PASS_ON: Final = ("debounce", "throttle_first", "sample", "delay", "skip", "tak
 """Operators of reactivex that send the tokens that they get, and are given numbers."""
 
 _LEFT_OUT: Final = ("scheduler",)
-_WORDS: Final = {int: "int", float: "float", bool: "switch", str: "text"}
+_WORDS: Final = {int: "int", float: "float", bool: "bool", str: "text"}
 
 
 def operators(graph: Graph) -> list[dict[str, Any]]:

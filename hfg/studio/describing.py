@@ -27,6 +27,7 @@ from hfg.nodetypes.node import Node
 from hfg.panels import Call, Change
 from hfg.ports import Port
 from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS, SUBGRAPH_EVENTS, SUBGRAPH_SLOTS
+from hfg.ports.kinds import without_none
 from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.studio.annotating import annotations_of
 from hfg.studio.offering import arguments_of, offers
@@ -267,6 +268,7 @@ def _parameter(spec: ParameterSpec, described: ParameterDescription) -> dict[str
         "doc": described.doc,
         "default": None if required or spec.trigger else _data(spec, spec.default),
         "required": required,
+        "optional": without_none(spec.type) is not spec.type,
         "limits": {name: limit for name, limit in described.limits.items() if isinstance(limit, int | float | str)},
         "low": _number(spec.minimum),
         "high": _number(spec.maximum),

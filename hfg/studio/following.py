@@ -74,6 +74,17 @@ class Following:
         self.forget_problems()
         self.refresh_all(by, text)
 
+    def start_over(self, project: Project, steering: Steering) -> None:
+        """Something else takes the place of graph and run: no table has anything of them any more."""
+        self.stop_following()
+        self.project, self.steering = project, steering
+        self.tables, self.attribution, self.spans = Tables(), Attribution(), Spans()
+        self._layouts = Layouts(self)
+        self._problems.clear()
+        self._dirty.clear()
+        self._is_stale = self.is_described = False
+        self._soon = self._check = None
+
     def tell(self, patch: bytes | None) -> None:
         """Send a patch to all that have the tables."""
         if patch is not None:

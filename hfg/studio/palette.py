@@ -104,7 +104,7 @@ def _search(
     own: tuple[str, ...], words: str, hint: Any, begins: bool | None, category: str, most: int
 ) -> dict[str, Any]:
     known = _all(own)
-    numbers = ranked(known.index, words) if words.strip() else range(len(known.types))
+    numbers = ranked(known.index, words, typing=True) if words.strip() else range(len(known.types))
     types = [known.types[number] for number in numbers]
     chosen = [one for one in types if not category or one.category == category]
     rows = [_row(one) if begins is None else _fitted(one, hint, begins) for one in chosen]

@@ -163,11 +163,20 @@ class Project:
         if not path:
             self.begin(Graph("graph"), discard=discard)
             return
-        self._need_saved(discard)
+        self.need_saved(discard)
+        file = self.existing(path)
+        self._take(self._read(file), file)
+
+    def existing(self, path: str) -> Path:
+        """Return the path of a file inside the folder.
+
+        Raises:
+          Refused: it leads out of the folder, or there is no such file.
+        """
         file = self.within(path)
         if not file.is_file():
             raise Refused("file", f'there is no file "{path}" in the folder "{self.folder.name}"')
-        self._take(self._read(file), file)
+        return file
 
     def begin(self, graph: Graph, *, discard: bool) -> None:
         """Take a graph that has no file yet.
@@ -175,7 +184,7 @@ class Project:
         Raises:
           Refused: there are unsaved edits.
         """
-        self._need_saved(discard)
+        self.need_saved(discard)
         self._take(graph, None)
 
     def reread(self) -> None:
@@ -186,7 +195,8 @@ class Project:
             raise Refused("file", f"{self.file.name} is no longer a file")
         self._take(self._read(self.file), self.file)
 
-    def _need_saved(self, discard: bool) -> None:
+    def need_saved(self, discard: bool) -> None:
+        """Refuse to lose edits, unless they are given up."""
         if self.changes and not discard:
             raise Refused("changed", f"{_count(self.changes)} would be lost; save first, or discard them")
 
@@ -271,19 +281,38 @@ class Project:
         name = "new" if self.file is None else self.file.name
         return list(difflib.unified_diff(theirs, mine, f"{name} (disk)", f"{name} (yours)", lineterm=""))[:_MOST_LINES]
 
+    # --- recordings ---
+
+    def recording(self, graph: Graph, file: Path) -> RecordedProject:
+        """Return the project of a recording in the same folder."""
+        return RecordedProject(graph, file, self.folder, allow=self.allow, read=self._read)
+
 
 class RecordedProject(Project):
     """The project of a recording, which has nothing to save."""
 
-    def __init__(self, graph: Graph, file: Path) -> None:
-        super().__init__(graph, file.resolve().parent, keep=False)
-        self._recording = file.name
+    def __init__(
+        self,
+        graph: Graph,
+        file: Path,
+        folder: Path | None = None,
+        *,
+        allow: Iterable[str] = (),
+        read: Callable[[Path], Graph] | None = None,
+    ) -> None:
+        super().__init__(graph, folder or file.resolve().parent, allow=allow, read=read, keep=False)
+        self._recording = file.resolve()
 
     @override
     def record(self) -> FileRecord:
+        path = str(self._recording.relative_to(self.folder))
         return msgspec.structs.replace(
-            super().record(), name=self._recording, path=self._recording, kind="recording", changes=0
+            super().record(), name=self._recording.name, path=path, kind="recording", changes=0
         )
+
+    def graph_project(self) -> Project:
+        """Return the project of an empty graph in the same folder, which can open others."""
+        return Project(Graph("graph"), self.folder, allow=self.allow, read=self._read)
 
 
 def _kind(file: Path) -> str:

@@ -16,7 +16,7 @@ from typing_extensions import override
 
 from hfg.graph import Graph
 from hfg.recording.reading import Loss
-from hfg.studio.messages import Condition, Pause, Proceed, Seek, Start, Step
+from hfg.studio.messages import Condition, Open, Pause, Proceed, Seek, Start, Step
 from hfg.studio.recorded import Recorded, Values
 from hfg.studio.records import NodeRecord, ProblemRecord
 from hfg.studio.refusing import Refused
@@ -45,7 +45,7 @@ class Replay(Steering):
       jumps: counts how often the cursor was put elsewhere.
     """
 
-    looking = frozenset({Start, Pause, Proceed, Step, Seek})
+    looking = frozenset({Start, Pause, Proceed, Step, Seek, Open})
     is_live = False
 
     def __init__(self, recorded: Recorded, graph: Graph, follower: Follower) -> None:

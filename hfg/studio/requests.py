@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Final, TypeAlias
 
@@ -14,6 +15,8 @@ from hfg.studio import messages as m
 from hfg.studio.asking import ask
 from hfg.studio.following import Following
 from hfg.studio.offering import change_of, offered_action, signal_of
+from hfg.studio.project import RecordedProject
+from hfg.studio.recorded import Recorded
 from hfg.studio.refusing import Refused
 from hfg.studio.starters import starter_graph
 from hfg.studio.viewing import Viewer
@@ -164,14 +167,30 @@ async def _unbreak(host: Host, viewer: Viewer, message: m.Unbreak) -> None:
 # --- the file ---
 
 
-async def _open(host: Host, viewer: Viewer, message: m.Open) -> None:
+async def _open(host: Any, viewer: Viewer, message: m.Open) -> None:
     async with host.turn:
+        host.may_open()
         _need_rest(host)
+        if message.path.endswith(".mcap"):
+            await _open_recording(host, message)
+            return
+        was_recording = isinstance(host.project, RecordedProject)
+        project = host.project.graph_project() if isinstance(host.project, RecordedProject) else host.project
         if message.starter:
-            host.project.begin(starter_graph(message.starter), discard=message.discard)
+            project.begin(starter_graph(message.starter), discard=message.discard)
         else:
-            host.project.open(message.path, discard=message.discard)
-        host.take_graph(viewer.number, f"open {message.path or host.graph.name}")
+            project.open(message.path, discard=message.discard)
+        if was_recording:
+            await host.exchange(project, None)
+        else:
+            host.take_graph(viewer.number, f"open {message.path or host.graph.name}")
+
+
+async def _open_recording(host: Any, message: m.Open) -> None:
+    host.project.need_saved(message.discard)
+    file = host.project.existing(message.path)
+    recorded = await asyncio.to_thread(Recorded, file, None, allow=host.project.allow)
+    await host.exchange(host.project.recording(recorded.graph_after(0), file), recorded)
 
 
 async def _reread(host: Host, viewer: Viewer, message: m.Reread) -> None:

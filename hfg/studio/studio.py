@@ -36,7 +36,7 @@ from hfg.studio.messages import (
 from hfg.studio.project import Project
 from hfg.studio.recorded import Recorded
 from hfg.studio.recorded_topics import RECORDED
-from hfg.studio.refusing import reject
+from hfg.studio.refusing import Refused, reject
 from hfg.studio.replaying import SENTENCE, Replay
 from hfg.studio.requests import answer
 from hfg.studio.steering import Steering
@@ -81,16 +81,45 @@ class Studio(Following):
     ) -> None:
         steering = Steering(project.graph, self, target) if recorded is None else Replay(recorded, project.graph, self)
         super().__init__(project, steering)
-        self._topics = TOPICS if recorded is None else RECORDED
-        self.boot = os.urandom(8).hex()
-        self.read_only = read_only if recorded is None else SENTENCE
+        self._forbids = read_only
         self.level = level
+        self._recognize(recorded)
         self._count = 0
         self._beating: asyncio.TimerHandle | None = None
         self._looking: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         if run is not None:
             self.steering.follow(run)
+
+    def _recognize(self, recorded: Recorded | None) -> None:
+        """Set what differs between a graph and a recording; revisions of before are those of another studio."""
+        self._topics = TOPICS if recorded is None else RECORDED
+        self.boot = os.urandom(8).hex()
+        self.read_only = self._forbids if recorded is None else SENTENCE
+
+    async def exchange(self, project: Project, recorded: Recorded | None) -> None:
+        """Show a recording in place of the graph, or a graph in place of a recording.
+
+        All pages are sent away, and come back by themselves.
+        """
+        steering, before = self.steering, self.project
+        graph = project.graph
+        self.start_over(project, Steering(graph, self) if recorded is None else Replay(recorded, graph, self))
+        self._recognize(recorded)
+        self.level = ""
+        asyncio.get_running_loop().call_soon(self._send_all_away)
+        before.close()
+        await steering.close()
+
+    def may_open(self) -> None:
+        """Refuse to open anything if the studio was started to look at one thing only."""
+        if self._forbids:
+            raise Refused("read_only", self._forbids)
+
+    def _send_all_away(self) -> None:
+        for viewer in list(self.viewers.values()):
+            viewer.send_away(1012, "another file was opened")
+            self.leave(viewer)
 
     # --- pages ---
 

@@ -111,6 +111,28 @@ def test_a_part_of_another_word_finds_nothing() -> None:
     assert names(limit, words="rate") == []  # nor does "delimited" count for "limit", see the order of the first test
 
 
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [
+        ("thresh", "threshold"),
+        ("thr", "threshold"),
+        ("gaus", "gaussian_blur"),
+        ("circ", "hough_circles"),
+        ("webc", "Camera"),  # of a word that means the same
+        ("read im", "read_image"),
+        ("resh", "threshold"),
+    ],
+)
+def test_the_last_word_may_be_incomplete_while_it_is_typed(library: Index, typed: str, meant: str) -> None:
+    found = [library.entries[number].title for number in ranked(library, typed, typing=True)]
+    assert meant in found[:3]
+
+
+def test_complete_words_find_the_same_first_while_they_are_typed(library: Index) -> None:
+    for words in ("threshold", "resize image", "median blur", "PID"):
+        assert ranked(library, words, typing=True)[0] == ranked(library, words)[0]
+
+
 def test_a_phrase_means_something_else_than_its_words(library: Index) -> None:
     best = [library.entries[ranked(library, words)[0]].title for words in ("bar code", "rate limiter", "bird eye")]
     assert best[0] == "BarcodeReader"

@@ -20,7 +20,7 @@ from hfg.studio.project import RecordedProject
 from hfg.studio.recorded import Recorded
 from hfg.studio.replaying import Replay
 from hfg.studio.studio import Studio
-from tests.studio.page import Page
+from tests.studio.page import Page, live, studio_of
 from tests.studio.recordings import patrol, recording_of
 
 Story = Callable[[Page], Coroutine[Any, Any, None]]
@@ -181,7 +181,6 @@ def test_what_would_change_a_recording_is_refused_in_one_sentence(run_file: Path
             {"t": "trigger", "path": "rest.begin"},
             {"t": "break", "path": "scale"},
             {"t": "stop"},
-            {"t": "open", "path": "other.hfg.yaml"},
         ):
             answer = await page.ask(**message)
             assert answer["message"].startswith("this is a recording; it can be looked at, not changed")
@@ -189,6 +188,42 @@ def test_what_would_change_a_recording_is_refused_in_one_sentence(run_file: Path
         assert page.hello["read_only"].startswith("this is a recording")
 
     watched(run_file, story)
+
+
+def test_a_recording_takes_the_place_of_a_graph_and_the_other_way_round(run_file: Path) -> None:
+    hfg.save(hfg.Graph("drawn"), run_file.with_name("drawn.hfg.yaml"))
+
+    async def main() -> None:
+        studio = studio_of(hfg.Graph("empty"), run_file.parent)
+        page = Page(studio).join()
+        listed = (await page.value("folder", path=""))["files"]
+        assert ("run.mcap", "recording") in [(one["name"], one["kind"]) for one in listed]
+        assert (await page.ask("open", path="run.mcap"))["t"] == "ack"
+        await page.until(lambda: page.closed is not None)
+        assert page.closed == (1012, "another file was opened")
+        again = Page(studio).join()
+        assert again.boot != page.boot
+        assert again.tables["studio"]["file"]["kind"] == "recording"
+        assert "scale" in again.tables["nodes"]
+        assert (await again.ask("edit", commands=[{"do": "Remove", "path": "scale"}]))["code"] == "read_only"
+        assert (await again.ask("open", path="drawn.hfg.yaml"))["t"] == "ack"
+        await again.until(lambda: again.closed is not None)
+        third = Page(studio).join()
+        assert (third.tables["studio"]["file"]["graph"], third.hello["read_only"]) == ("drawn", "")
+        await studio.close()
+
+    live(main)
+
+
+def test_who_may_only_look_at_a_recording_opens_nothing_else(run_file: Path) -> None:
+    async def main() -> None:
+        recorded = Recorded(run_file)
+        project = RecordedProject(recorded.graph_after(0), run_file)
+        page = Page(Studio(project, recorded=recorded, read_only="only look")).join()
+        assert (await page.ask("open", path="run.mcap"))["message"] == "only look"
+        await page.studio.close()
+
+    live(main)
 
 
 def test_failures_of_the_run_are_in_the_list_of_problems_at_their_times(run_file: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections.abc import Iterator
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Interval
@@ -25,6 +25,7 @@ __all__ = [
     "jam",
     "look",
     "mission",
+    "of_all_kinds",
     "picture",
     "scaled",
     "workshop",
@@ -260,3 +261,17 @@ def jam() -> hfg.Graph:
     graph.connect(both.ports.outputs["right"], add.right)
     third >> graph.add(halves(), name="off", enabled=False)
     return graph
+
+
+@hfg.node
+def of_all_kinds(
+    value: int,
+    *,
+    loud: bool = False,
+    way: Literal["forth", "back"] = "forth",
+    seed: int | None = None,
+    size: tuple[int, int] = (5, 5),
+    days: frozenset[Literal["sat", "sun"]] = frozenset({"sat"}),
+) -> int:
+    """Have a parameter of each kind."""
+    return value

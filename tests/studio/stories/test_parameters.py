@@ -5,7 +5,10 @@ from __future__ import annotations
 import pytest
 from playwright.sync_api import Locator, expect
 
+import hfg
 from tests.studio.stories.bench import Story
+from tests.studio.stories.conftest import Open
+from tests.studio.stories.graphs import count, of_all_kinds
 
 pytestmark = pytest.mark.slow
 
@@ -87,3 +90,30 @@ def test_whoever_is_faster_than_the_studio_goes_on_from_what_was_set(story: Stor
     story.settle()
     assert story.bench.node("scale").factor == 2
     expect(field(story, "factor")).to_have_value("2")
+
+
+def test_each_kind_of_parameter_of_a_function_has_its_widget(open_studio: Open) -> None:
+    graph = hfg.Graph("kinds")
+    graph.connect(graph.add(count(), name="numbers").out, graph.add(of_all_kinds(), name="all").value)
+    story = open_studio(graph)
+    node = story.bench.node("all")
+    story.select("all")
+    box = field(story, "loud")
+    expect(box).to_have_attribute("type", "checkbox")
+    box.click()
+    story.bench.until(lambda: node.loud is True)
+    field(story, "way").select_option("back")
+    story.bench.until(lambda: node.way == "back")
+    expect(field(story, "seed")).to_have_value("")  # None
+    field(story, "seed").fill("4")
+    story.press("Enter")
+    story.bench.until(lambda: node.seed == 4)
+    expect(field(story, "seed")).to_have_value("4")
+    field(story, "seed").fill("")
+    story.press("Enter")
+    story.bench.until(lambda: node.seed is None)
+    story.page.get_by_label("size, 2 of 2").fill("7")
+    story.press("Enter")
+    story.bench.until(lambda: node.size == (5, 7))
+    story.page.get_by_role("group", name="days").get_by_label("sun").click()
+    story.bench.until(lambda: node.days == {"sat", "sun"})

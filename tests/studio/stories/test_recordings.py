@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
+import hfg
 from hfg.studio.replaying import Replay
 from tests.studio.recordings import recording_of
 from tests.studio.stories.bench import Story
@@ -65,11 +67,12 @@ def test_dragging_in_the_timeline_shows_graph_values_and_activity_of_that_time(s
     scrub(story, 1.0, 5.05)
     expect(story.node("rest")).to_have_class(re.compile(r"\bactive\b"))
     expect(row.locator(".v")).to_have_text("250")
-    expect(story.page.locator("#side .sec").first.locator("input").last).to_have_value("5")
+    factor = story.page.locator("#side .sec").first.locator(".par", has_text="factor")
+    expect(factor).to_contain_text("5")
     scrub(story, 5.0, 1.05)
     expect(story.node("rest")).not_to_have_class(re.compile(r"\bactive\b"))
     expect(row.locator(".v")).to_have_text("20")
-    expect(story.page.locator("#side .sec").first.locator("input").last).to_have_value("2")
+    expect(factor).to_contain_text("2")
 
 
 def test_a_node_that_was_added_while_it_ran_is_there_from_then_on(story: Story) -> None:
@@ -137,3 +140,30 @@ def test_the_timeline_is_saved_as_that_of_a_run(story: Story) -> None:
     text = Path(download.value.path()).read_text()
     assert '"name":"scale"' in text
     assert '"thread_name"' in text
+
+
+def test_nothing_of_a_recording_looks_as_if_it_could_be_changed(story: Story) -> None:
+    story.select("scale")
+    expect(story.page.locator("#side")).to_contain_text("group")
+    expect(story.page.locator("#side")).to_contain_text("enabled")
+    expect(story.page.locator("#side").locator("select, input, textarea")).to_have_count(0)
+    expect(story.page.locator("#side")).not_to_contain_text("Breakpoint")
+
+
+def test_a_recording_is_opened_from_the_list_of_files_and_a_graph_after_it(
+    open_studio: Callable[..., Story], run_file: Path, tmp_path: Path
+) -> None:
+    shutil.copy(run_file, tmp_path / "run.mcap")
+    hfg.save(hfg.Graph("empty"), tmp_path / "other.hfg.yaml")
+    story = open_studio()
+    story.press("Control+o")
+    story.page.get_by_role("dialog").get_by_role("button", name="run.mcap").click()
+    expect(story.page.locator(".clock")).to_contain_text("of 10.00 s")
+    expect(story.page.get_by_role("button", name="Play", exact=False)).to_be_visible()
+    expect(story.node("scale")).to_be_visible()
+    assert isinstance(story.bench.studio.steering, Replay)
+    story.press("Control+o")
+    story.page.get_by_role("dialog").get_by_role("button", name="other.hfg.yaml").click()
+    expect(story.page.locator(".crumbs")).to_contain_text("empty")
+    story.bench.until(lambda: story.bench.studio.read_only == "")
+    expect(story.page.get_by_role("button", name="Start (Space)")).to_be_enabled()

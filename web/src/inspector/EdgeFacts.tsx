@@ -14,6 +14,7 @@ export function EdgeFacts({ edge: key }: { edge: string }) {
     setValue(null);
     return socket.subscribe("value", { path: key }, 4, (next) => setValue(next as Value)).end;
   }, [key]);
+  const never = useStudio((s) => (s.hello?.read_only ?? "") !== "");
   if (!edge) return null;
   return (
     <>
@@ -37,16 +38,20 @@ export function EdgeFacts({ edge: key }: { edge: string }) {
           <button type="button" className="btn line" onClick={() => pin(key)}>
             Pin a probe
           </button>
-          <button type="button" className="btn line" onClick={() => void makeActive(key)}>
-            {edge.active ? "Make it passive" : "Make it active"} <kbd>A</kbd>
-          </button>
-          <button type="button" className="btn line" onClick={() => void disconnect(key)}>
-            Delete the edge
-          </button>
+          {!never && (
+            <>
+              <button type="button" className="btn line" onClick={() => void makeActive(key)}>
+                {edge.active ? "Make it passive" : "Make it active"} <kbd>A</kbd>
+              </button>
+              <button type="button" className="btn line" onClick={() => void disconnect(key)}>
+                Delete the edge
+              </button>
+            </>
+          )}
         </div>
       </div>
       <EdgeOptions edge={key} />
-      <StopEditor path={key} />
+      {!never && <StopEditor path={key} />}
     </>
   );
 }

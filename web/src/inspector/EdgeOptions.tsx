@@ -2,6 +2,7 @@ import type { Command, Data, ParameterType } from "../protocol/types";
 import { edit } from "../state/actions";
 import { socket } from "../state/link";
 import { endsOf } from "../state/paths";
+import { useStudio } from "../state/studio";
 import { useAnswer } from "../state/useAnswer";
 import { Field } from "./Field";
 import { Operators } from "./Operators";
@@ -12,6 +13,7 @@ type Option = ParameterType & { value: Data; why: string };
 export function EdgeOptions({ edge }: { edge: string }) {
   const found = useAnswer<{ options: Option[]; anew: Command[] }>("edge", { path: edge });
   const [source, target] = endsOf(edge);
+  const never = useStudio((s) => (s.hello?.read_only ?? "") !== "");
   const set = (name: string) => (value: Data, gesture: string) =>
     socket.request({ t: "edit", commands: [{ do: "SetEdge", source, target, [name]: value }], gesture });
   const anew = (name: string) => {
@@ -22,7 +24,7 @@ export function EdgeOptions({ edge }: { edge: string }) {
     <div className="sec">
       <h3>
         Settings<span className="sp" />
-        <small>change at once, undoable</small>
+        <small>{never ? "" : "change at once, undoable"}</small>
       </h3>
       {(found?.options ?? []).map((one) =>
         one.kind === "operators" ? (

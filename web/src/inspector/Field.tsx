@@ -3,9 +3,12 @@ import { Refusal } from "../protocol/socket";
 import type { Data, ParameterType } from "../protocol/types";
 import { locked as lockedNow, newGesture } from "../state/actions";
 import { useStudio } from "../state/studio";
-import { short } from "../ui/words";
+import { said, short } from "../ui/words";
+import { Fixed } from "./Fixed";
 import { Choice } from "./widgets/Choice";
+import { Choices } from "./widgets/Choices";
 import { Colour } from "./widgets/Colour";
+import { Numbers } from "./widgets/Numbers";
 import { Plain } from "./widgets/Plain";
 import { Slider } from "./widgets/Slider";
 import { Switch } from "./widgets/Switch";
@@ -54,8 +57,10 @@ export function Field({ id, type, value, locked, set, anew }: Props) {
       )
       .then(() => setAsked((now) => (now === mine ? null : now)));
   };
+  const never = useStudio((s) => (s.hello?.read_only ?? "") !== "");
   const Widget = widgetFor(type);
   const help = [type.doc, locked, changed && `usually ${short(type.default)}; double click resets it`];
+  if (never) return <Fixed name={type.name} value={`${said(value)}${type.unit ? ` ${type.unit}` : ""}`} title={type.doc} />;
   return (
     <>
       <div className={changed ? "par ch" : "par"} title={help.filter(Boolean).join("\n")}>
@@ -89,10 +94,15 @@ function widgetFor(type: ParameterType): (props: WidgetProps) => React.ReactNode
     case "int":
     case "float":
       return Slider;
-    case "switch":
-      return Switch;
+    case "bool":
+      return type.optional ? Choice : Switch;
     case "choice":
       return Choice;
+    case "choices":
+      return Choices;
+    case "interval":
+    case "vector":
+      return Numbers;
     case "colour":
       return Colour;
     case "text":

@@ -2,6 +2,7 @@ import type { Command } from "../protocol/types";
 import { edit, locked, newGesture } from "../state/actions";
 import { useStudio } from "../state/studio";
 import { useAnswer } from "../state/useAnswer";
+import { Fixed } from "./Fixed";
 
 interface Gates {
   by: string;
@@ -11,10 +12,11 @@ interface Gates {
 }
 
 /** Whose activity opens a node, and how often it still fires while closed. */
-export function GateEditor({ path }: { path: string }) {
+export function GateEditor({ path, fixed }: { path: string; fixed: boolean }) {
   const gates = useAnswer<Gates>("gates", { path });
   const off = useStudio((s) => s.age === 3) || locked() !== "";
   if (!gates) return null;
+  if (fixed) return <Fixed name="works while" value={gates.by === "" ? "always" : said(gates.by, path)} />;
   const choose = (by: string) => void edit(by === "" ? gates.none : (gates.rows.find((row) => row.path === by)?.commands ?? []), newGesture());
   const setRate = (text: string) => {
     const rate = text.trim() === "" ? null : Number(text.replace(",", "."));
@@ -31,7 +33,7 @@ export function GateEditor({ path }: { path: string }) {
             <option value="">always</option>
             {gates.rows.map((row) => (
               <option key={row.path} value={row.path}>
-                {row.path === path ? "it is active" : `${row.path.split("/").join(" › ")} is active`}
+                {said(row.path, path)}
               </option>
             ))}
           </select>
@@ -58,3 +60,5 @@ export function GateEditor({ path }: { path: string }) {
     </>
   );
 }
+
+const said = (by: string, path: string): string => (by === path ? "it is active" : `${by.split("/").join(" › ")} is active`);

@@ -39,6 +39,7 @@ export function Inspector() {
 }
 
 function OfNode({ path }: { path: string }) {
+  const never = useStudio((s) => (s.hello?.read_only ?? "") !== "");
   return (
     <>
       <NodeHead path={path} />
@@ -47,8 +48,8 @@ function OfNode({ path }: { path: string }) {
       <Measured path={path} />
       <Ports path={path} />
       <Placement path={path} />
-      <Promotions path={path} />
-      <StopEditor path={path} />
+      {!never && <Promotions path={path} />}
+      {!never && <StopEditor path={path} />}
     </>
   );
 }

@@ -8,6 +8,7 @@ export function Parameters({ path }: { path: string }) {
   const node = useStudio((s) => s.tables.nodes[path]);
   const type = useStudio((s) => s.tables.types[node?.type ?? ""]);
   const recording = useStudio((s) => isRecording(s.tables.studio.run));
+  const never = useStudio((s) => (s.hello?.read_only ?? "") !== "");
   const limit = limitOf(node);
   if (!node) return null;
   const shown = (type?.parameters ?? []).filter((one) => node.shown.includes(one.name));
@@ -18,7 +19,7 @@ export function Parameters({ path }: { path: string }) {
     <div className="sec">
       <h3>
         Parameters<span className="sp" />
-        <small>{recording ? "at the cursor" : "change at once, undoable"}</small>
+        <small>{recording ? "at the cursor" : never ? "" : "change at once, undoable"}</small>
       </h3>
       {[...groups].map(([group, members]) => (
         <div key={group}>

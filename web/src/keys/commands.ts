@@ -127,7 +127,7 @@ export const DOINGS: Doing[] = [
   { name: "Save a picture of this level as SVG", keys: "", run: () => void saveSvg() },
   { name: "Save a picture of this level as PNG", keys: "", run: () => void savePng() },
   { name: "Save", keys: "Ctrl+S", off: edits(), run: () => void act.save() },
-  { name: "Open or save as", keys: "Ctrl+O", off: edits(), run: () => change({ popover: "open" }) },
+  { name: "Open or save as", keys: "Ctrl+O", off: act.unsteerable, run: () => change({ popover: "open" }) },
   { name: "Keys", keys: "?", run: () => change({ popover: "keys" }) },
   { name: "Leave what was begun, then the selection, then the level", keys: "Escape", run: leaveSomething },
 ];

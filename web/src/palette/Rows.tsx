@@ -1,5 +1,6 @@
 import { useEffect, useRef, useState } from "react";
 import type { Found, FoundRow } from "../protocol/types";
+import { partsOf } from "./marking";
 
 interface Props {
   found: Found | null;
@@ -75,15 +76,11 @@ function useSlow(waits: boolean): boolean {
   return slow && waits;
 }
 
+/** The letters that were typed stand out. */
 function Marked({ text, words }: { text: string; words: string }) {
-  const word = words.trim().toLowerCase();
-  const at = word === "" ? -1 : text.toLowerCase().indexOf(word);
-  if (at < 0) return <>{text}</>;
   return (
     <>
-      {text.slice(0, at)}
-      <mark>{text.slice(at, at + word.length)}</mark>
-      {text.slice(at + word.length)}
+      {partsOf(text, words).map(([part, typed], at) => (typed ? <mark key={at}>{part}</mark> : part))}
     </>
   );
 }

@@ -90,6 +90,8 @@ export interface ParameterType {
   doc: string;
   default: Data;
   required: boolean;
+  /** It may be nothing, null. */
+  optional?: boolean;
   limits: Limits | null;
   low: number | null;
   high: number | null;
@@ -99,6 +101,8 @@ export interface ParameterType {
   step: number | null;
   group: string | null;
   read_only: boolean;
+  /** Of a vector or matrix: how long each axis is, null for any length. */
+  shape?: (number | null)[] | null;
   [more: string]: unknown;
 }
 

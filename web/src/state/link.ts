@@ -18,6 +18,10 @@ export const socket = new Socket(address(), {
     showLevel();
   },
   closed(code, reason) {
+    if (code === OTHER_THING) {
+      location.reload(); // nothing that the page has is of that
+      return;
+    }
     const state = studio();
     const closedAt = state.phase === "closed" ? state.closedAt : performance.now();
     change({ phase: code === 4401 || code === 1008 ? "refused" : "closed", closedWhy: reason, closedAt, wire: null });
@@ -27,6 +31,9 @@ export const socket = new Socket(address(), {
     return rev < 0 || hello === null ? null : { boot: boot ?? "", rev };
   },
 });
+
+/** The studio closes with this code when it shows a recording instead of a graph, or the other way round. */
+const OTHER_THING = 1012;
 
 let boot: string | null = null;
 /** Levels that the studio lays out for this page, the one that is shown last: who comes back finds them as they are. */

@@ -30,3 +30,6 @@ export function short(value: unknown): string {
   if (typeof value === "string") return value;
   return JSON.stringify(value) ?? "";
 }
+
+/** A value of a parameter, for people. */
+export const said = (value: unknown): string => (value === null || value === undefined ? "none" : value === true ? "yes" : value === false ? "no" : short(value));

@@ -59,7 +59,8 @@ export function Slider({ id, type, value, off, bad, set }: WidgetProps) {
     if (text === null) return;
     const next = Number(text.replace(",", "."));
     setText(null);
-    if (text.trim() !== "" && Number.isFinite(next) && next !== number) set(next, newGesture());
+    if (type.optional && text.trim() === "" && value !== null) set(null, newGesture());
+    if (text.trim() !== "" && Number.isFinite(next) && (next !== number || value === null)) set(next, newGesture());
   };
   const share = (one: number) => `${Math.min(100, Math.max(0, ((one - low) / (high - low || 1)) * 100))}%`;
   return (
@@ -67,14 +68,15 @@ export function Slider({ id, type, value, off, bad, set }: WidgetProps) {
       <div className="sl range" onPointerDown={down} onPointerMove={move} onPointerUp={up} data-slider={type.name}>
         <i style={{ width: share(shown) }} />
         {typeof type.default === "number" && <s style={{ left: share(type.default) }} />}
-        <u style={{ left: share(shown) }} />
+        {(drag !== null || value !== null) && <u style={{ left: share(shown) }} />}
       </div>
       <div className={`fld${bad ? " bad-field" : ""}${off ? " locked" : ""}`}>
         <input
           id={id}
           inputMode="decimal"
           readOnly={off}
-          value={text ?? digits(shown, step, type.kind === "int")}
+          placeholder={type.optional ? "none" : undefined}
+          value={text ?? (drag === null && value === null ? "" : digits(shown, step, type.kind === "int"))}
           onChange={(event) => setText(event.target.value)}
           onKeyDown={key}
           onBlur={commit}
