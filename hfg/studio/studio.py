@@ -51,6 +51,9 @@ _BEAT_S: Final = 1 / 60
 _SHARE: Final = 0.03
 """Of the loop's time, for all streams of all pages together: if they want more, they all get fewer frames."""
 
+_OTHER_THING: Final = 4012
+"""Close code: pages load themselves again. A server that ends closes with 1012, which pages survive."""
+
 _MOST_VIEWERS: Final = 32
 _MOST_LEVELS: Final = 64
 
@@ -118,7 +121,7 @@ class Studio(Following):
 
     def _send_all_away(self) -> None:
         for viewer in list(self.viewers.values()):
-            viewer.send_away(1012, "another file was opened")
+            viewer.send_away(_OTHER_THING, "another file was opened")
             self.leave(viewer)
 
     # --- pages ---

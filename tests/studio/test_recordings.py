@@ -200,7 +200,7 @@ def test_a_recording_takes_the_place_of_a_graph_and_the_other_way_round(run_file
         assert ("run.mcap", "recording") in [(one["name"], one["kind"]) for one in listed]
         assert (await page.ask("open", path="run.mcap"))["t"] == "ack"
         await page.until(lambda: page.closed is not None)
-        assert page.closed == (1012, "another file was opened")
+        assert page.closed == (4012, "another file was opened")
         again = Page(studio).join()
         assert again.boot != page.boot
         assert again.tables["studio"]["file"]["kind"] == "recording"

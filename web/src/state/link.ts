@@ -33,7 +33,7 @@ export const socket = new Socket(address(), {
 });
 
 /** The studio closes with this code when it shows a recording instead of a graph, or the other way round. */
-const OTHER_THING = 1012;
+const OTHER_THING = 4012;
 
 let boot: string | null = null;
 /** Levels that the studio lays out for this page, the one that is shown last: who comes back finds them as they are. */
