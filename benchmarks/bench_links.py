@@ -55,6 +55,11 @@ def rows() -> None:
     row("ezmsg", peer("ezmsg_links", "units"), 20_000, 300, needs="ezmsg")
     row("dora, large pool", peer("dora_links", "nodes"), 20_000, 600, needs="dora pyarrow")
     row("multiprocessing.Pipe", peer("standard_links", "pipe"), 60_000, 150)
+    add(
+        "socket pair, two asyncio loops | 100 B, rate",
+        job_for(peer("standard_links", "socket_pair"), "letter", 0, False),
+        2_000,
+    )
     row("shared memory and semaphores", peer("standard_links", "ring"), 60_000, 500)
 
 
@@ -116,12 +121,13 @@ def goal(name: str, ours: str, theirs: str, at_most: float, by: str = "wall", th
 def goals() -> None:
     """What is to be reached; rates as times between two that arrive, so that less is better."""
     express, asyncio = "Zenoh, express puts", "Zenoh, express puts to asyncio"
-    batches = "Zenoh, puts that share batches"
+    batches, sockets = "Zenoh, puts that share batches", "socket pair, two asyncio loops"
     for who in ("edge", "link"):
         small, first = "100 B, rate", f"100 B, {who}"
         goal(f"{first}, window 64 / {express}", f"hfg {who}, window 64 | {small}", f"{express} | {small}", 1 / 1.2)
         goal(f"{first}, window 64 / {batches}", f"hfg {who}, window 64 | {small}", f"{batches} | {small}", 1 / 1.2)
         goal(f"{first}, window 1 / {express}", f"hfg {who}, window 1 | {small}", f"{express} | {small}", 1 / 0.14)
+        goal(f"{first}, window 1 / {sockets}", f"hfg {who}, window 1 | {small}", f"{sockets} | {small}", 1.5)
         for other in (express, asyncio):
             ours, theirs = f"hfg {who}, window 8 | 100 B, latency", f"{other} | 100 B, latency"
             goal(f"{first}, one way / {other}", ours, theirs, 1.1, "p50")

@@ -1,20 +1,22 @@
-"""Two processes with only the standard library: a pipe, and slots in shared memory that semaphores guard.
+"""Two processes with only the standard library: a pipe, slots in shared memory that semaphores guard, a socket pair.
 
 Nothing is lost; the one that sends waits. A leaky variant is not tried.
 """
 
 from __future__ import annotations
 
+import asyncio
 import multiprocessing
+import socket
 from collections.abc import Callable
 from multiprocessing.shared_memory import SharedMemory
 from typing import Any
 
 import numpy as np
 
-from benchmarks.parcels import HEAD, SHAPE, Job, Picture, Post, letter, opened, picture, picture_bytes
+from benchmarks.parcels import HEAD, LETTER, SHAPE, Job, Picture, Post, letter, opened, picture, picture_bytes
 
-__all__ = ["pipe", "ring"]
+__all__ = ["pipe", "ring", "socket_pair"]
 
 SLOTS = 8
 CONTEXT = multiprocessing.get_context("spawn")
@@ -70,6 +72,65 @@ def ring(job: Job) -> dict[str, float]:
         buffer.release()
         memory.close()
         memory.unlink()
+
+
+def socket_pair(job: Job) -> dict[str, float]:
+    """A socket between two asyncio loops: a letter, its answer, the next letter, which is a window of 1."""
+    there, here = socket.socketpair()
+    post = Post(job)
+    process = CONTEXT.Process(target=send_to_socket, args=(job, there), daemon=True)
+    process.start()
+    there.close()
+
+    def arrived(letters: asyncio.Transport, received: bytes) -> bool:
+        post.take_letter(received)
+        letters.write(b".")
+        return post.is_over
+
+    asyncio.run(hear(here, LETTER, arrived))
+    process.join()
+    return post.figures()
+
+
+def send_to_socket(job: Job, there: socket.socket) -> None:
+    """Send: the other process."""
+    numbers = iter(range(job.number))
+
+    def answered(answers: asyncio.Transport, _received: bytes) -> bool:
+        number = next(numbers, None)
+        if number is not None:
+            answers.write(letter(number))
+        return number is None
+
+    asyncio.run(hear(there, 1, answered, begins=True))
+
+
+async def hear(
+    end: socket.socket, size: int, arrived: Callable[[asyncio.Transport, bytes], bool], *, begins: bool = False
+) -> None:
+    """Hear what arrives at one end of a socket, in pieces of that size, until `arrived` says that it is over."""
+    loop = asyncio.get_running_loop()
+    over = loop.create_future()
+
+    class Ear(asyncio.Protocol):
+        pending = b""
+        transport: asyncio.Transport
+
+        def connection_made(self, transport: Any) -> None:
+            self.transport = transport
+            if begins:
+                arrived(transport, b"")
+
+        def data_received(self, data: bytes) -> None:
+            self.pending += data
+            while len(self.pending) >= size and not over.done():
+                piece, self.pending = self.pending[:size], self.pending[size:]
+                if arrived(self.transport, piece):
+                    over.set_result(None)
+
+    transport, _ = await loop.create_connection(Ear, sock=end)
+    await over
+    transport.close()
 
 
 def view_of(memory: SharedMemory) -> memoryview:
