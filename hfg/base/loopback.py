@@ -88,13 +88,18 @@ class OwnListener(socket.socket):
     refused = 0
     _users: PeerUsers | None = None
 
+    @property
+    def is_guarded(self) -> bool:
+        """Whether the system tells it whose programs connect."""
+        return self._users is not None
+
     @override
     def listen(self, backlog: int = socket.SOMAXCONN, /) -> None:
         super().listen(backlog)
         if self._users is None and sys.platform == "linux":
             try:
                 self._users = PeerUsers(self)
-            except OSError:  # the kernel was built without this
+            except OSError:  # the kernel was built without this, or the program may not ask it
                 return
 
     @override

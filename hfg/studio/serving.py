@@ -1,6 +1,6 @@
 """The server's thread: its loop is not the graph's, so neither waits for the other.
 
-Depends on uvicorn, `crowding` and `web`.
+Depends on uvicorn, `crowding`, `discreet` and `web`.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import asyncio
 import errno
 import os
 import socket
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -16,10 +17,12 @@ from typing import Any, Final
 
 import uvicorn
 
+from hfg.base.logs import Log
 from hfg.base.loopback import OwnListener
 from hfg.errors import TargetError
 from hfg.studio.cookies import forget_secret, secret_of_port
 from hfg.studio.crowding import bounded_http
+from hfg.studio.discreet import DiscreetWebSocket
 from hfg.studio.entrance import Entrance, is_loopback, need_guarded
 from hfg.studio.messages import LONGEST, FromPage, read
 from hfg.studio.studio import Studio
@@ -31,6 +34,7 @@ __all__ = ["STATIC", "Server", "StudioDoor"]
 STATIC: Final = Path(__file__).with_name("static")
 """The built page; HFG_STUDIO_STATIC names another folder, for those who work on the page."""
 
+_LOGGER: Final = Log("hfg.studio")
 _PORTS: Final = range(8800, 8900)
 _LOCALHOST: Final = ("127.0.0.1", "::1")
 _NO_SUCH_ADDRESS: Final = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
@@ -100,6 +104,14 @@ class Server:
         need_guarded(host, encrypted=encrypted, insecure=insecure)
         self._sockets = _listening(host, port)
         self._port = port = int(self._sockets[0].getsockname()[1])
+        if sys.platform == "linux" and any(
+            isinstance(one, OwnListener) and not one.is_guarded for one in self._sockets
+        ):
+            _LOGGER.warning(
+                "port %d: this system does not tell whose programs connect (sock_diag), so only the token and the "
+                "cookie keep other users of the computer away",
+                port,
+            )
         shown = socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
         names = () if shown == host else (shown,)
         self.entrance = Entrance(
@@ -111,7 +123,9 @@ class Server:
         self._thread = threading.Thread(target=self._live, name="hfg studio server", daemon=True)
 
     def _live(self) -> None:
-        asyncio.run(self._server.serve(sockets=self._sockets))
+        # The loop is named because it has to ask `OwnListener` for its connections; that of uvloop accepts them itself.
+        with asyncio.Runner(loop_factory=asyncio.SelectorEventLoop) as runner:
+            runner.run(self._server.serve(sockets=self._sockets))
 
     def start(self) -> None:
         """Begin."""
@@ -130,7 +144,7 @@ def _config(app: Any, certfile: str | None, keyfile: str | None) -> uvicorn.Conf
     return uvicorn.Config(
         app,
         http=bounded_http(),
-        ws="websockets-sansio",
+        ws=DiscreetWebSocket,
         ws_max_size=LONGEST,
         ws_ping_interval=20.0,
         ws_per_message_deflate=False,

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import base64
+import errno
 import os
 import socket
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +17,7 @@ import pytest
 
 from hfg.base.loopback import OwnListener
 from hfg.errors import TargetError
+from hfg.studio.messages import SUBPROTOCOL
 from hfg.studio.serving import Server, StudioDoor
 from tests.studio.page import live, studio_of
 from tests.studio.test_studio import doubling
@@ -79,6 +83,81 @@ def test_a_program_of_another_user_gets_no_answer_even_with_the_token(family: so
         assert mine == "HTTP/1.1 200 OK"
 
     live(main)
+
+
+def test_a_program_that_has_its_own_kind_of_loop_lets_nobody_past_the_check() -> None:
+    """As with uvloop, whose servers accept connections without asking the socket."""
+
+    class Policy(asyncio.DefaultEventLoopPolicy):
+        def new_event_loop(self) -> asyncio.AbstractEventLoop:
+            raise AssertionError("the server has taken the program's kind of loop")
+
+    async def main() -> None:
+        server = Server(StudioDoor(asyncio.get_running_loop(), studio_of(doubling())))
+        asyncio.set_event_loop_policy(Policy())
+        try:
+            server.start()
+            port, token = urlsplit(server.address).port, server.entrance.token
+            assert port is not None
+            assert await asyncio.to_thread(asks, *HERE[0], port, token) == "HTTP/1.1 200 OK"
+            await server.stop()
+        finally:
+            asyncio.set_event_loop_policy(None)
+
+    live(main)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells whose programs connect")
+def test_it_is_said_if_the_system_does_not_tell_whose_programs_connect(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def refuses(*_: object) -> None:
+        raise OSError(errno.EAFNOSUPPORT, os.strerror(errno.EAFNOSUPPORT))
+
+    async def main() -> None:
+        server = Server(StudioDoor(asyncio.get_running_loop(), studio_of(doubling())))
+        server.start()
+        await server.stop()
+
+    live(main)
+    assert "whose programs connect" not in caplog.text
+    monkeypatch.setattr("hfg.base.loopback.PeerUsers", refuses)
+    live(main)
+    assert len([one for one in caplog.records if "does not tell whose programs connect" in one.message]) == 1
+
+
+def test_no_log_tells_the_token_or_the_cookie(caplog: pytest.LogCaptureFixture) -> None:
+    """Programs log at level DEBUG, and others may read their logs."""
+
+    async def main() -> tuple[str, str]:
+        server = Server(StudioDoor(asyncio.get_running_loop(), studio_of(doubling())))
+        server.start()
+        entrance, port = server.entrance, urlsplit(server.address).port
+        assert port is not None
+        cookie = entrance.set_cookie.partition(";")[0]
+        for proof in (
+            f"Authorization: Bearer {entrance.token}",
+            f"Cookie: {cookie}\r\nOrigin: http://localhost:{port}",
+        ):
+            assert await asyncio.to_thread(upgrades, port, proof) == "HTTP/1.1 101 Switching Protocols"
+        assert await asyncio.to_thread(asks, *HERE[0], port, entrance.token) == "HTTP/1.1 200 OK"
+        await server.stop()
+        return entrance.token, cookie.partition("=")[2]
+
+    with caplog.at_level("DEBUG", ""):
+        for secret in asyncio.run(main()):
+            assert secret not in caplog.text
+
+
+def upgrades(port: int, proof: str) -> str:
+    """Ask for the WebSocket; returns the first line of the answer."""
+    with socket.create_connection(("127.0.0.1", port), 10) as one:
+        one.sendall(
+            f"GET /ws HTTP/1.1\r\nHost: localhost:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            f"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: {base64.b64encode(bytes(16)).decode()}\r\n"
+            f"Sec-WebSocket-Protocol: {SUBPROTOCOL}\r\n{proof}\r\n\r\n".encode()
+        )
+        return one.recv(1000).partition(b"\r\n")[0].decode()
 
 
 @pytest.fixture
