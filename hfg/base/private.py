@@ -31,6 +31,7 @@ __all__ = [
     "open_private",
     "require_peer_credentials",
     "state_folder",
+    "way_to",
 ]
 
 _PEER: Final = struct.Struct("3i")  # process, user and group of who is at the other end
@@ -161,7 +162,7 @@ def check_parents(folder: Path, purpose: str = MEETING) -> None:
     Raises:
       TransportError: another user can.
     """
-    for place in _way_to(folder.absolute()):
+    for place in way_to(folder.absolute()):
         try:
             found = place.lstat()
         except OSError:
@@ -178,7 +179,7 @@ def check_parents(folder: Path, purpose: str = MEETING) -> None:
         )
 
 
-def _way_to(folder: Path) -> list[Path]:
+def way_to(folder: Path) -> list[Path]:
     """Return each folder and each link that the system passes on the way to a folder, without the folder itself.
 
     A link leads to further links, and whoever can replace one of them decides where the way ends.

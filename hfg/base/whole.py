@@ -1,7 +1,6 @@
 """Files that are complete or absent: written next to their place, flushed to disk, then renamed.
 
-A full disk, a size limit or a sudden end of the process leaves the old file, or none. Depends only on the standard
-library.
+A full disk, a size limit or a sudden end of the process leaves the old file, or none. Depends on `private`.
 """
 
 from __future__ import annotations
@@ -15,10 +14,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Final, Literal
 
-__all__ = ["GrowingFile", "need_writable", "read_plain", "write_in_place", "write_whole"]
+from hfg.base.private import way_to
+
+__all__ = ["GrowingFile", "create", "need_trusted", "need_writable", "read_plain", "write_in_place", "write_whole"]
 
 _HELD_BYTES: Final = 64 * 1024
 _PERMISSIONS: Final = 0o777  # never those by which a file runs as its owner
+_SHARED: Final = stat.S_ISVTX | stat.S_IWOTH  # of a folder in which all may write, and none removes another's files
 
 
 def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool = True) -> None:
@@ -46,15 +48,24 @@ def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool
         with beside.open("xb") as file:
             write(file)
             file.flush()
+            _take_permissions(file, target)
             os.fsync(file.fileno())
-        with suppress(OSError):
-            beside.chmod(target.stat().st_mode & _PERMISSIONS)
         beside.replace(target)
     except BaseException:
         with suppress(OSError):
             beside.unlink()
         raise
     _keep_the_name(target)
+
+
+def create(path: Path) -> BinaryIO:
+    """Open a file that is not there yet.
+
+    Raises:
+      OSError: it is there, or cannot be made.
+    """
+    need_trusted(path)
+    return path.open("xb")
 
 
 def write_in_place(path: Path) -> BinaryIO:
@@ -106,28 +117,54 @@ def _open(target: Path, mode: Literal["ab", "wb"], buffering: int = -1) -> Binar
 
 
 def _target(path: Path) -> Path:
-    _need_trusted(path)
+    need_trusted(path)
     target = path.resolve() if path.is_symlink() else path
     if target != path:
-        _need_trusted(target)
+        need_trusted(target)
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     return target
 
 
-def _need_trusted(path: Path) -> None:
+def _take_permissions(file: BinaryIO, target: Path) -> None:
+    """Let a file take over the permissions of the file that it replaces, if that one is ours.
+
+    By its handle: whoever may write to the folder could put a link to another file of ours under the file's name.
+    """
+    with suppress(OSError):
+        there = target.stat()
+        if hasattr(os, "fchmod") and there.st_uid == os.geteuid():
+            os.fchmod(file.fileno(), there.st_mode & _PERMISSIONS)
+
+
+def need_trusted(path: Path) -> None:
     """Refuse a link or pipe of another user: in a folder that others may write to, it leads to a file of ours, or him.
+
+    In a folder like /tmp, in which each user owns what he has made, a file of another user and a link on the way are
+    refused as well: there they were put in the way, and elsewhere users work together.
 
     Raises:
       OSError: it is one.
     """
-    try:
-        there = path.lstat()
-    except FileNotFoundError:
+    if not hasattr(os, "geteuid"):
         return
-    for is_one, what in ((stat.S_ISLNK, "symbolic link"), (stat.S_ISFIFO, "pipe")):
-        if is_one(there.st_mode) and hasattr(os, "geteuid") and there.st_uid not in (0, os.geteuid()):
-            raise PermissionError(errno.EPERM, f"a {what} of another user is in its place; remove it", str(path))
+    for place in (*way_to(path.absolute()), path):
+        try:
+            there = place.lstat()
+        except FileNotFoundError:
+            continue
+        is_link, is_pipe = stat.S_ISLNK(there.st_mode), stat.S_ISFIFO(there.st_mode)
+        if there.st_uid in (0, os.geteuid()) or stat.S_ISDIR(there.st_mode):
+            continue
+        if (place is path and (is_link or is_pipe)) or _is_in_the_way(place, there):
+            what = "symbolic link" if is_link else "pipe" if is_pipe else "file"
+            raise PermissionError(errno.EPERM, f"a {what} of another user is in its place; remove it", str(place))
+
+
+def _is_in_the_way(place: Path, there: os.stat_result) -> bool:
+    """Say whether an entry of another user is in a folder like /tmp, and not by the owner of that folder."""
+    around = place.parent.stat()
+    return around.st_mode & _SHARED == _SHARED and there.st_uid != around.st_uid
 
 
 def _is_no_file(path: Path) -> bool:
@@ -250,12 +287,12 @@ class GrowingFile:
             self.flush()
             if self.lost:
                 raise OSError(errno.EIO, f"{self.lost} pieces could not be written; the others are in {self.place}")
+            if self.place != self._target:
+                _take_permissions(self._file, self._target)
             with suppress(OSError):  # a pipe cannot
                 os.fsync(self._file.fileno())
         finally:
             self._file.close()
         if self.place != self._target:
-            with suppress(OSError):
-                self.place.chmod(self._target.stat().st_mode & _PERMISSIONS)
             self.place.replace(self._target)
             _keep_the_name(self._target)

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hfg.base.token import NO_MESSAGE, Marker, Token
-from hfg.base.whole import write_in_place
+from hfg.base.whole import create, write_in_place
 from hfg.errors import UsageError
 from hfg.recording.mcap import Writer
 from hfg.recording.messages import (
@@ -266,7 +266,7 @@ def open_new(path: Path, *, force: bool) -> BinaryIO:
       UsageError: it already exists, or cannot be made.
     """
     try:
-        return write_in_place(path) if force else path.open("xb")
+        return write_in_place(path) if force else create(path)
     except FileExistsError:
         raise is_there(path) from None
     except OSError as error:

@@ -7,7 +7,10 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 
 import hfg
@@ -20,9 +23,10 @@ from hfg.sharedmemory import sweep
 from hfg.studio.journal import Journal
 from hfg.studio.project import Project
 from hfg.studio.refusing import Refused
+from hfg.testing import fire
 
 pytest.importorskip("tests.attacks.another_user", exc_type=ImportError)
-from tests.attacks.another_user import as_nobody
+from tests.attacks.another_user import NOBODY, as_nobody
 
 pytestmark = [pytest.mark.rule("L4"), pytest.mark.rule("L5"), pytest.mark.timeout(60)]
 only_root = pytest.mark.skipif(
@@ -89,6 +93,124 @@ def test_nothing_waits_at_a_pipe_of_another_user_or_tells_him_what_is_written(
     as_nobody(lambda: os.mkfifo(shared / "one"))
     with pytest.raises((OSError, UsageError), match="a pipe of another user is in its place|already exists"):
         write(shared / "one")
+
+
+@only_root
+@pytest.mark.parametrize("write", WRITES.values(), ids=WRITES)
+def test_nothing_is_written_over_a_link_of_another_user_on_the_way(
+    shared: Path, precious: Path, write: Callable[[Path], object]
+) -> None:
+    """Linux can be told not to follow such links (fs.protected_symlinks), and is not everywhere."""
+    as_nobody(lambda: (shared / "out").symlink_to(precious.parent))
+    mine = precious.parent / "mine"
+    mine.symlink_to(shared / "out")
+    for path in (shared / "out" / "precious", shared / "out" / "new", mine / "new"):
+        with pytest.raises((OSError, UsageError), match="link of another user is in its place|already exists"):
+            write(path)
+    assert precious.read_text() == "precious"
+    assert {one.name for one in precious.parent.iterdir()} == {"precious", "mine"}
+
+
+@only_root
+@pytest.mark.parametrize("write", WRITES.values(), ids=WRITES)
+def test_nothing_is_written_into_a_file_that_another_user_has_put_into_a_shared_folder(
+    shared: Path, write: Callable[[Path], object]
+) -> None:
+    def puts() -> None:
+        (shared / "one").write_text("theirs")
+        (shared / "one").chmod(0o666)
+
+    as_nobody(puts)
+    with pytest.raises((OSError, UsageError), match="a file of another user is in its place|already exists"):
+        write(shared / "one")
+    assert (shared / "one").read_text() == "theirs"
+
+
+@pytest.fixture
+def theirs() -> Iterator[Path]:
+    """A folder in which another user may do everything, and in which we write."""
+    folder = Path(tempfile.mkdtemp(prefix="hfg-attack-", dir="/tmp"))
+    folder.chmod(0o777)
+    os.chown(folder, NOBODY, NOBODY)
+    yield folder
+    shutil.rmtree(folder)
+
+
+def permissions(file: Path) -> int:
+    return file.stat().st_mode & 0o777
+
+
+def puts_a_link(unfinished: Path, to: Path) -> None:
+    unfinished.rename(unfinished.with_name("moved"))
+    unfinished.symlink_to(to)
+
+
+@only_root
+def test_no_file_gets_permissions_through_a_link_that_takes_the_place_of_what_is_written(
+    theirs: Path, precious: Path
+) -> None:
+    precious.chmod(0o600)
+    target = theirs / "one"
+    target.touch()
+    target.chmod(0o666)
+    growing = GrowingFile(target, append=False, at_once=True)
+    growing.write(b"mine")
+    as_nobody(lambda: puts_a_link(growing.place, precious))
+    growing.complete()
+    assert permissions(precious) == 0o600
+    target.unlink()
+    target.touch()
+    target.chmod(0o666)
+
+    def write(_: object) -> None:
+        (unfinished,) = theirs.glob(".hfg-*.part")
+        as_nobody(lambda: puts_a_link(unfinished, precious))
+
+    write_whole(target, write)
+    assert permissions(precious) == 0o600
+    assert precious.read_text() == "precious"
+
+
+@only_root
+def test_a_file_of_another_user_hands_its_permissions_down_to_none_of_ours(theirs: Path) -> None:
+    def puts() -> None:
+        (theirs / "one").touch()
+        (theirs / "one").chmod(0o666)
+
+    as_nobody(puts)
+    before = os.umask(0o077)
+    try:
+        write_whole(theirs / "one", lambda file: file.write(b"mine"))
+    finally:
+        os.umask(before)
+    assert permissions(theirs / "one") == 0o600
+
+
+@only_root
+def test_a_video_is_written_into_no_other_file_whatever_is_put_in_its_place(
+    theirs: Path, precious: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another user who may write to the folder wins the race against OpenCV most of the time; here, always."""
+    from hfg.nodes.video import WriteVideo
+
+    precious.chmod(0o600)
+    (precious.parent / "video.avi").symlink_to(precious)
+
+    real = cv2.VideoWriter
+
+    def after_the_attack(path: str, *rest: Any) -> Any:
+        (unfinished,) = theirs.glob(".out-*")
+        as_nobody(lambda: puts_a_link(unfinished, precious if unfinished.is_file() else precious.parent))
+        return real(path, *rest)
+
+    after_the_attack.fourcc = real.fourcc  # type: ignore[attr-defined]
+    monkeypatch.setattr(cv2, "VideoWriter", after_the_attack)
+    node = WriteVideo(path=str(theirs / "out.avi"))
+    fire(node, image=np.zeros((48, 64, 3), np.uint8))
+    fire(node, slot="finish")
+    assert precious.read_text() == "precious"
+    assert permissions(precious) == 0o600
+    assert (theirs / "out.avi").read_bytes()[:4] == b"RIFF"
 
 
 @only_root

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
+import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import cv2
 from annotated_types import Interval
 
+from hfg.base.whole import need_trusted
 from hfg.images import Picture
 from hfg.nodes._encodable import need_encodable
 from hfg.nodes._pictures import colour, need_picture
@@ -62,7 +66,7 @@ class WriteVideo(Node):
     written = Event(str)
 
     writer: State[Any] = State(None)
-    temporary: State[str | None] = State(None)
+    unfinished: State[_Unfinished | None] = State(None)
     target = State("")
     size = State((0, 0))
     count = State(0)
@@ -103,7 +107,8 @@ class WriteVideo(Node):
 
     def _need_room(self) -> None:
         """OpenCV does not say that a disk is full, so look before each picture."""
-        if _room(Path(str(self.temporary))) < _LEAST_BYTES:
+        assert self.unfinished is not None
+        if _room(self.unfinished.path) < _LEAST_BYTES:
             self.clear()
             with reaching(self.target, "write"):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -115,20 +120,22 @@ class WriteVideo(Node):
                 'set width and height, or take "mp4v" and a name that ends with .mp4'
             )
         target = Path(self.path).absolute()
-        handle, temporary = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.stem}-", dir=self._folder())
-        os.close(handle)
-        writer = cv2.VideoWriter(temporary, cv2.VideoWriter.fourcc(*self.codec), self.fps, size)
+        self._folder()
+        with reaching(self.path, "write"):
+            need_trusted(target)
+            unfinished = _Unfinished(target)
+        writer = cv2.VideoWriter(str(unfinished.path), cv2.VideoWriter.fourcc(*self.codec), self.fps, size)
         if not writer.isOpened():
             with reaching(self.path, "write"):
                 try:
-                    _need_room(Path(temporary))
+                    _need_room(unfinished.path)
                 finally:
-                    Path(temporary).unlink()
+                    unfinished.remove()
             raise ValueError(
                 f'OpenCV does not write "{self.path}" with the codec {self.codec}: take "MJPG" and a name that ends '
                 "with .avi"
             )
-        self.writer, self.temporary, self.target, self.size = writer, temporary, str(target), size
+        self.writer, self.unfinished, self.target, self.size = writer, unfinished, str(target), size
         self.count = 0
 
     @slot
@@ -139,23 +146,22 @@ class WriteVideo(Node):
     @slot
     def clear(self) -> None:
         """Throw away what was written since the last video."""
-        if self.writer is not None:
+        if self.unfinished is not None:
             self.writer.release()
-            Path(str(self.temporary)).unlink(missing_ok=True)
-            self.writer = self.temporary = None
+            self.unfinished.remove()
+            self.writer = self.unfinished = None
 
     def _close(self) -> str:
+        unfinished = self.unfinished
+        assert unfinished is not None
         self.writer.release()
-        temporary = Path(str(self.temporary))
-        self.writer = self.temporary = None
+        self.writer = self.unfinished = None
         try:
             with reaching(self.target, "write"):
-                _need_complete(temporary, self.count)
-                temporary.chmod(0o666 & ~_umask())
-                temporary.replace(self.target)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
+                _need_complete(unfinished.path, self.count)
+                unfinished.path.replace(self.target)
+        finally:
+            unfinished.remove()
         return self.target
 
     def end(self) -> None:
@@ -172,6 +178,39 @@ class WriteVideo(Node):
             self._close()
 
 
+class _Unfinished:
+    """A file next to another one, in a folder that only this user can enter.
+
+    OpenCV writes to a path, so whoever may write to the outer folder could put a link in the place of the file. The
+    path leads through the handle of the folder, so that it stays the right one if the folder is moved.
+
+    Attributes:
+      path: of the file, which OpenCV creates.
+    """
+
+    def __init__(self, target: Path) -> None:
+        self._folder = Path(tempfile.mkdtemp(prefix=f".{target.stem}-", dir=target.parent))
+        self._handle = -1
+        inside = self._folder
+        if sys.platform == "linux":
+            self._handle = os.open(self._folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+            there = os.fstat(self._handle)
+            if there.st_uid != os.geteuid() or stat.S_IMODE(there.st_mode) != stat.S_IRWXU:
+                os.close(self._handle)
+                raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+            inside = Path(f"/proc/self/fd/{self._handle}")
+        self.path = inside / f"video{target.suffix}"
+
+    def remove(self) -> None:
+        """Remove what is left of it."""
+        self.path.unlink(missing_ok=True)
+        if self._handle >= 0:
+            os.close(self._handle)
+            self._handle = -1
+        with suppress(OSError):  # another user, who may write to the outer folder, has moved it
+            self._folder.rmdir()
+
+
 def _need_room(file: Path) -> None:
     """See that a file can become longer, and leave it as it is.
 
@@ -185,7 +224,7 @@ def _need_room(file: Path) -> None:
             stream.flush()
             os.fsync(stream.fileno())
         finally:
-            os.truncate(file, length)
+            os.ftruncate(stream.fileno(), length)
 
 
 def _need_complete(file: Path, count: int) -> None:
@@ -214,10 +253,3 @@ def _room(file: Path) -> int:
         return _LEAST_BYTES
     disk = os.statvfs(file)
     return disk.f_frsize * (disk.f_bavail if os.geteuid() else disk.f_bfree)
-
-
-def _umask() -> int:
-    """Return the rights that new files lack; a temporary file is accessible only to its owner."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
