@@ -9,6 +9,7 @@ from __future__ import annotations
 import gc
 import logging
 import os
+import signal
 import sys
 from collections import Counter
 from collections.abc import Generator
@@ -36,6 +37,8 @@ def pytest_configure(config: pytest.Config) -> None:
     if config.option.fuse_after is not None:
         run_settings.FUSE_AFTER = config.option.fuse_after
     settings.load_profile("soak" if config.option.markexpr == "soak" else "suite")
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # by a shell that runs the tests in the background
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
