@@ -130,18 +130,21 @@ def test_a_port_in_use_is_said_in_words() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.rule("L5")
 @pytest.mark.timeout(120)
-def test_edits_are_offered_after_the_server_was_killed(tmp_path: Path) -> None:
+def test_after_a_sudden_end_edits_are_offered_to_pages_with_their_cookies_and_after_another_end_no_more(
+    tmp_path: Path,
+) -> None:
     hfg.save(doubling(), tmp_path / "doubling.hfg.yaml")
 
-    async def edited(address: str) -> None:
-        async with await come_in(address) as socket:
+    async def edited(address: str, cookie: str) -> None:
+        async with await come_in(address, cookie) as socket:
             await socket.send('{"t":"join"}')
             await until(socket, "snapshot")
             await ask(socket, t="edit", commands=[{"do": "SetParameter", "path": "scaled.factor", "value": 9}])
 
-    async def taken_up(address: str) -> None:
-        async with await come_in(address) as socket:
+    async def taken_up(address: str, cookie: str) -> None:
+        async with await come_in(address, cookie) as socket:
             await socket.send('{"t":"join"}')
             tables = (await until(socket, "snapshot"))["tables"]
             assert tables["studio"]["file"]["journal"]["changes"] == 1
@@ -149,35 +152,24 @@ def test_edits_are_offered_after_the_server_was_killed(tmp_path: Path) -> None:
             await ask(socket, t="journal", take=True)
             await ask(socket, t="save")
 
+    async def refused(address: str, cookie: str) -> None:
+        with pytest.raises(websockets.InvalidStatus):
+            await come_in(address, cookie)
+        async with await come_in(address) as socket:
+            assert (await until(socket, "hello"))["boot"]
+
     with StudioProcess("doubling.hfg.yaml", "--allow", "tests", folder=tmp_path) as studio:
-        asyncio.run(edited(studio.address))
-        studio.kill()
-        studio.start()
-        asyncio.run(taken_up(studio.address))
-    assert hfg.load(tmp_path / "doubling.hfg.yaml", allow=["tests"])["scaled"].factor == 9
-
-
-@pytest.mark.slow
-@pytest.mark.rule("L5")
-@pytest.mark.timeout(120)
-def test_a_page_comes_back_with_its_cookie_after_a_sudden_end_and_not_after_another(tmp_path: Path) -> None:
-    async def joined(address: str, cookie: str) -> bool:
-        try:
-            async with await come_in(address, cookie) as socket:
-                return bool((await until(socket, "hello"))["boot"])
-        except websockets.InvalidStatus:
-            return False
-
-    with StudioProcess(folder=tmp_path) as studio:
         first = studio.address
         cookie = asyncio.run(cookie_of(first))
+        asyncio.run(edited(first, cookie))
         studio.kill()
         studio.start()
         assert studio.address != first  # the token is another one
-        assert asyncio.run(joined(studio.address, cookie))
+        asyncio.run(taken_up(studio.address, cookie))
         studio.end()
         studio.start()
-        assert not asyncio.run(joined(studio.address, cookie))
+        asyncio.run(refused(studio.address, cookie))
+    assert hfg.load(tmp_path / "doubling.hfg.yaml", allow=["tests"])["scaled"].factor == 9
 
 
 @pytest.mark.slow

@@ -27,6 +27,8 @@ def test_the_page_is_live_again_without_a_reload_when_the_connection_is_back(sto
     story.start()
     story.page.evaluate("window.sameDocument = true")
     story.bench.cut()
+    story.until(lambda: not story.page.evaluate("said.isOpen"), "the page has lost the connection")
+    story.time_passes()
     expect(story.page.locator(".live")).to_contain_text("away")
     expect(story.page.locator(".frame")).to_have_class(re.compile(r"\bold\b"))
     expect(story.page.locator(".toast")).to_contain_text("Edits wait")
