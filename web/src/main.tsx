@@ -5,7 +5,7 @@ import { watchActivity } from "./live/activity";
 import { watchLoad } from "./live/load";
 import { watchWaits } from "./live/waits";
 import { socket, watchAge } from "./state/link";
-import { change, studio } from "./state/studio";
+import { change, isNarrow, studio } from "./state/studio";
 import { applyTheme } from "./ui/colours";
 
 applyTheme(studio().theme);
@@ -16,6 +16,8 @@ watchWaits();
 watchAge();
 socket.connect();
 document.addEventListener("visibilitychange", () => socket.send({ t: "visible", on: !document.hidden }));
+let narrow = isNarrow();
 window.addEventListener("resize", () => {
-  if (window.innerWidth <= 1100 && studio().side) change({ side: false });
+  if (isNarrow() !== narrow) change({ side: narrow, stage: narrow });
+  narrow = isNarrow();
 });

@@ -36,30 +36,61 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
   );
 
   const onMove = useCallback((_: unknown, view: Viewport) => settle(view), [settle]);
+  /** How the view was chosen for the person, who has not moved it since: it then follows the size of the window. */
+  const chosen = useRef<"first" | "all" | null>(null);
   const onMoveEnd = useCallback(
     (_: unknown, view: Viewport) => {
-      kept.set(key(current.current), view);
+      if (!isSame(view, own.current)) {
+        chosen.current = null;
+        kept.set(key(current.current), view);
+      }
       setPartly(isPartly(current.current, view, root.current));
     },
     [root],
   );
+  const own = useRef<Viewport | null>(null);
+  const fit = useCallback(
+    (how: "first" | "all", duration: number) => {
+      const element = root.current;
+      if (!element || !current.current) return;
+      const view = (how === "all" ? allInView : firstView)(boundsOf(current.current), element.clientWidth, element.clientHeight);
+      chosen.current = how;
+      own.current = view;
+      void flow.setViewport(view, { duration });
+      if (duration > 0) return;
+      settle(view);
+      setPartly(isPartly(current.current, view, element));
+    },
+    [flow, root, settle],
+  );
 
   const showAll = useCallback(() => {
+    kept.delete(key(current.current));
+    fit("all", still.matches ? 0 : 200);
+  }, [fit]);
+
+  useEffect(() => {
     const element = root.current;
-    if (!element || !current.current) return;
-    const view = allInView(boundsOf(current.current), element.clientWidth, element.clientHeight);
-    void flow.setViewport(view, { duration: still.matches ? 0 : 200 });
-  }, [flow, root]);
+    if (!element) return;
+    const observer = new ResizeObserver(() => chosen.current !== null && fit(chosen.current, 0));
+    observer.observe(element);
+    return () => observer.disconnect();
+  }, [fit, root]);
 
   useEffect(() => {
     const element = root.current;
     if (!layout || !element || shown.current === key(layout)) return;
     shown.current = key(layout);
-    const view = kept.get(key(layout)) ?? (layout.deep ? allInView : firstView)(boundsOf(layout), element.clientWidth, element.clientHeight);
+    const view = kept.get(key(layout));
+    if (!view) {
+      fit(layout.deep ? "all" : "first", 0);
+      return;
+    }
+    chosen.current = null;
     void flow.setViewport(view);
     settle(view);
     setPartly(isPartly(layout, view, element));
-  }, [layout, flow, root, settle]);
+  }, [layout, flow, root, settle, fit]);
 
   useEffect(() => {
     const reveal = (event: Event) => {
@@ -75,17 +106,19 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
       const inside = x > 0 && y > 0 && x + box.width * view.zoom < element.clientWidth && y + box.height * view.zoom < element.clientHeight;
       if (!inside) void flow.setCenter(box.x + box.width / 2, box.y + box.height / 2, { zoom: Math.max(view.zoom, 0.6), duration: still.matches ? 0 : 200 });
     };
-    const fit = () => showAll();
     window.addEventListener("hfg-show", reveal);
-    window.addEventListener("hfg-show-all", fit);
+    window.addEventListener("hfg-show-all", showAll);
     return () => {
       window.removeEventListener("hfg-show", reveal);
-      window.removeEventListener("hfg-show-all", fit);
+      window.removeEventListener("hfg-show-all", showAll);
     };
   }, [flow, root, showAll]);
 
   return { level, partly, onMove, onMoveEnd, showAll };
 }
+
+const isSame = (a: Viewport, b: Viewport | null): boolean =>
+  b !== null && Math.abs(a.x - b.x) < 1 && Math.abs(a.y - b.y) < 1 && Math.abs(a.zoom - b.zoom) < 0.001;
 
 const key = (layout: LayoutRecord | undefined): string => (layout ? `${studio().tables.studio.file?.graph}:${studio().tables.studio.file?.path}:${studio().level}:${layout.view}:${layout.deep}` : "");
 

@@ -1,5 +1,5 @@
 import type { View } from "../state/studio";
-import { change, studio } from "../state/studio";
+import { change, isNarrow, studio } from "../state/studio";
 import { seek, stepTo } from "../live/replay";
 import { isRecording } from "../state/looking";
 import * as act from "../state/actions";
@@ -68,8 +68,9 @@ function followOrNot(): void {
 const replays = () => act.unsteerable() || (isRecording(studio().tables.studio.run) ? "" : "Only a recording goes back.");
 
 function leaveSomething(): void {
-  const { menu, popover, acting, selectedEdge, annotation, selection, panel, level } = studio();
+  const { menu, popover, acting, selectedEdge, annotation, selection, panel, level, side } = studio();
   if (menu || popover || acting) change({ menu: null, popover: null, palette: null, acting: null });
+  else if (side && isNarrow()) change({ side: false }); // it lies over the graph
   else if (selection.size > 0 || selectedEdge || annotation) act.select([]);
   else if (panel) change({ panel: null });
   else if (level !== "") act.leave();

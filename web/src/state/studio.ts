@@ -93,6 +93,9 @@ export interface Studio {
   begun: boolean;
 }
 
+/** Panels lie over the canvas then. */
+export const isNarrow = (): boolean => window.innerWidth <= 1100;
+
 const media = window.matchMedia("(prefers-color-scheme: dark)");
 
 const usualTheme = (): "light" | "dark" => (media.matches ? "dark" : "light");
@@ -136,9 +139,9 @@ export const useStudio = create<Studio>()(() => ({
   asked: [],
   insertAt: null,
   renaming: null,
-  side: window.innerWidth > 1100,
+  side: !isNarrow(),
   time: true,
-  stage: window.innerWidth > 1100,
+  stage: !isNarrow(),
   views_shown: null,
   acting: null,
   pins: [],

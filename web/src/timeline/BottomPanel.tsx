@@ -19,8 +19,8 @@ export function BottomPanel() {
         <div role="tablist" aria-label="Panels at the bottom" className="row" style={{ gap: 2 }}>
           <TabButton tab="timeline" now={tab} label="Timeline" />
           <TabButton tab="problems" now={tab} label="Problems" count={problems} bad={errors > 0} />
-          <TabButton tab="log" now={tab} label="Log" />
-          <TabButton tab="history" now={tab} label="History" count={steps} />
+          <TabButton tab="log" now={tab} label="Log" roomy />
+          <TabButton tab="history" now={tab} label="History" count={steps} roomy />
         </div>
         <span className="spring" />
         {open && tab === "timeline" && <TimelineButtons />}
@@ -37,10 +37,20 @@ export function BottomPanel() {
   );
 }
 
-function TabButton({ tab, now, label, count, bad }: { tab: Tab; now: Tab; label: string; count?: number; bad?: boolean }) {
+interface TabProps {
+  tab: Tab;
+  now: Tab;
+  label: string;
+  count?: number;
+  bad?: boolean;
+  /** Left out where the window is narrow. */
+  roomy?: boolean;
+}
+
+function TabButton({ tab, now, label, count, bad, roomy }: TabProps) {
   const chosen = tab === now;
   return (
-    <button type="button" role="tab" aria-selected={chosen} className={chosen ? "tab sel" : "tab"} onClick={() => change({ tab, time: true })}>
+    <button type="button" role="tab" aria-selected={chosen} className={`tab${chosen ? " sel" : ""}${roomy && !chosen ? " hide-n" : ""}`} onClick={() => change({ tab, time: true })}>
       {label}
       {count !== undefined && <span className={bad ? "pill bad" : "pill"}>{count}</span>}
     </button>

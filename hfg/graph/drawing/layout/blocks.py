@@ -51,6 +51,8 @@ _ROW: Final = 16.0  # named ports one below the other
 _COMB: Final = 10.0  # others
 _LEAST: Final = 22.0  # between ports side by side
 _MEASURED: Final = (72.0, 176.0)  # a node with bars
+_WIDER: Final = 1.05  # the letters of the page than those of drawings
+_SIGN: Final = 32.0  # of a node that waits, between its name and its badges
 _BELOW_BARS: Final = 54.0  # there rows of ports begin
 TAG_HEIGHT: Final = 14.0
 
@@ -101,7 +103,7 @@ def size(thing: Thing, *, measured: bool, inner: tuple[float, float] | None = No
         height = max(height, header + inner[1] + 32.0)
     elif measured and thing.shape.look == "node":
         height, least = max(height, _MEASURED[0] if len(sides["top"] + sides["bottom"]) else 48.0), _MEASURED[1]
-        wide.append(least)
+        wide += [least, _WIDER * _title_width(thing) + _SIGN]
     thing.width, thing.height = up(max(*wide, 96.0)), up(height)
     _place_upright(thing, sides, header)
     thing.left, thing.right = (_beside(sides[side]) for side in ("left", "right"))
