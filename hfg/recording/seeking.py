@@ -12,6 +12,7 @@ import threading
 from bisect import bisect_right
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator
+from itertools import accumulate
 from typing import Any, Final, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -42,6 +43,21 @@ class Found(NamedTuple):
     time: int
     piece: int
     place: int
+
+
+class _Piece(NamedTuple):
+    """A piece of the file that holds messages.
+
+    Attributes:
+      first, last: times of its messages, in nanoseconds.
+      number: its place in the file.
+      lists: where the lists of its messages lie, and how long each is, by channel; empty if it has none.
+    """
+
+    first: int
+    last: int
+    number: int
+    lists: dict[int, tuple[int, int]]
 
 
 class _Kept(Generic[T]):
@@ -79,32 +95,27 @@ class Seeking:
         self._lock = threading.RLock()
         self._lists: _Kept[dict[int, Array]] = _Kept(lambda lists: sum(one.nbytes for one in lists.values()))
         self._data: _Kept[bytes] = _Kept(len)
-        self._where: list[dict[int, tuple[int, int]]] = []
-        spans: list[tuple[int, int]] = []
-        self._pieces: list[int] = []
-        by_channel: dict[int, list[int]] = {}
-        for number, piece in enumerate(file.layout.pieces):
-            where = file.layout.indexes_of(piece) if piece.is_chunk else {}
-            first, last = file.layout.times_of(piece) if where else (None, None)
-            if first is None or last is None or first > last:
-                where = {}
-                first, last = self._span_of_content(number)
-            if first is None or last is None:
-                continue
-            self._where.append(where)
-            self._pieces.append(number)
-            spans.append((first, last))
-        order = sorted(range(len(spans)), key=spans.__getitem__)
-        self._where = [self._where[one] for one in order]
-        self._pieces = [self._pieces[one] for one in order]
-        self._begins = [spans[one][0] for one in order]
-        self._ends = np.maximum.accumulate([spans[one][1] for one in order]).tolist() if order else []
-        for index in range(len(order)):
-            for channel in self._where[index] or self._lists_of(index):
-                by_channel.setdefault(channel, []).append(index)
-        self._by_channel = by_channel
-        self.first = self._begins[0] if order else 0
-        self.last = self._ends[-1] if order else 0
+        numbers = range(len(file.layout.pieces))
+        self._pieces = sorted(piece for piece in map(self._piece, numbers) if piece is not None)
+        self._begins = [piece.first for piece in self._pieces]
+        self._ends = list(accumulate((piece.last for piece in self._pieces), max))
+        self._by_channel: dict[int, list[int]] = {}
+        for index, piece in enumerate(self._pieces):
+            for channel in piece.lists or self._lists_of(index):
+                self._by_channel.setdefault(channel, []).append(index)
+        self.first = self._begins[0] if self._pieces else 0
+        self.last = self._ends[-1] if self._pieces else 0
+
+    def _piece(self, number: int) -> _Piece | None:
+        """Return what a piece of the file holds; None if that is no messages."""
+        layout = self.file.layout
+        piece = layout.pieces[number]
+        lists = layout.indexes_of(piece) if piece.is_chunk else {}
+        first, last = layout.times_of(piece) if lists else (None, None)
+        if first is None or last is None or first > last:
+            lists = {}
+            first, last = self._span_of_content(number)
+        return None if first is None or last is None else _Piece(first, last, number, lists)
 
     def _span_of_content(self, number: int) -> tuple[int | None, int | None]:
         """Return the times in a piece without lists, which has to be read to find them."""
@@ -118,9 +129,9 @@ class Seeking:
         with self._lock:
             found = self._lists.get(index)
             if found is None:
-                where = self._where[index]
+                where = self._pieces[index].lists
                 read = self._read_lists(where) if where else None
-                found = self._listed(self._pieces[index]) if read is None else read
+                found = self._listed(self._pieces[index].number) if read is None else read
                 self._lists.put(index, found)
             return found
 
@@ -164,7 +175,7 @@ class Seeking:
             pairs = self._lists_of(index).get(channel, _NONE)
             number = int(np.searchsorted(pairs["time"], at, "right")) - 1
             if number >= 0 and (best is None or pairs["time"][number] > best.time):
-                best = Found(channel, int(pairs["time"][number]), self._pieces[index], int(pairs["place"][number]))
+                best = self._found(channel, index, pairs, number)
         return best
 
     def before(self, channels: Iterable[int], at: int) -> int | None:
@@ -205,7 +216,10 @@ class Seeking:
             pairs = self._lists_of(index).get(channel, _NONE)
             first, last = (int(np.searchsorted(pairs["time"], one, "right")) for one in (begin, end))
             for number in range(last - 1, first - 1, -1):
-                yield Found(channel, int(pairs["time"][number]), self._pieces[index], int(pairs["place"][number]))
+                yield self._found(channel, index, pairs, number)
+
+    def _found(self, channel: int, index: int, pairs: Array, number: int) -> Found:
+        return Found(channel, int(pairs["time"][number]), self._pieces[index].number, int(pairs["place"][number]))
 
     def _between(self, channel: int, begin: int, end: int) -> list[int]:
         holding = self._by_channel.get(channel, [])
@@ -221,7 +235,8 @@ class Seeking:
         wanted = frozenset(channels)
         last = bisect_right(self._begins, end)
         inside = range(min(bisect_right(self._ends, begin - 1), last), last)
-        sizes = [sum(length for one, (_, length) in self._where[index].items() if one in wanted) for index in inside]
+        lists = [self._pieces[index].lists for index in inside]
+        sizes = [sum(length for one, (_, length) in here.items() if one in wanted) for here in lists]
         every = max(1, -(-sum(sizes) // _MARK_BYTES))
         found: dict[int, list[Array]] = {}
         for index in inside[::every]:
@@ -270,7 +285,7 @@ class Seeking:
         for index in [*holding, *others]:
             pairs = self._lists_of(index).get(channel, _NONE)
             with self._lock:
-                data = self.file.unpacked(self._pieces[index])
+                data = self.file.unpacked(self._pieces[index].number)
             places = pairs["place"].tolist() if data is not None else []
             yield self._ends[index], [one for place in places if (one := _body(data or b"", place)) is not None]
 
