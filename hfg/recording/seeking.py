@@ -107,7 +107,7 @@ class Seeking:
         self.last = self._ends[-1] if self._pieces else 0
 
     def _piece(self, number: int) -> _Piece | None:
-        """Return what a piece of the file holds; None if that is no messages."""
+        """Describe a piece of the file; return None if it holds no messages."""
         layout = self.file.layout
         piece = layout.pieces[number]
         lists = layout.indexes_of(piece) if piece.is_chunk else {}
@@ -232,7 +232,7 @@ class Seeking:
 
         Of very many, only some are returned: of every other chunk, or of every tenth; of each channel evenly spread.
         """
-        wanted = frozenset(channels)
+        indexes = [self._pieces[index].lists for index in inside]
         last = bisect_right(self._begins, end)
         inside = range(min(bisect_right(self._ends, begin - 1), last), last)
         lists = [self._pieces[index].lists for index in inside]
