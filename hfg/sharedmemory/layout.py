@@ -13,7 +13,7 @@ from __future__ import annotations
 import struct
 from typing import Final
 
-__all__ = ["HEAD", "LANE_SIZE", "MAGIC", "MOST_SLOTS", "PAGE", "WORDS", "pages", "segment_size"]
+__all__ = ["HEAD", "LANE_SIZE", "MAGIC", "MOST_LANE", "MOST_SLOTS", "PAGE", "WORDS", "pages", "segment_size"]
 
 HEAD: Final = struct.Struct("<8sQQ")
 """Magic number, number of slots, bytes per slot."""
@@ -23,6 +23,8 @@ WORDS: Final = 64
 """Offset of the numbers of the slots."""
 MOST_SLOTS: Final = (PAGE - WORDS) // 16
 LANE_SIZE: Final = PAGE
+MOST_LANE: Final = 999_999_999
+"""The largest number of a lane, of as many digits as a name may have."""
 
 
 def pages(size: int) -> int:

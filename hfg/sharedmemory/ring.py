@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import mmap
 import os
+import secrets
 import threading
 import weakref
 from typing import Any, Final
@@ -18,7 +19,7 @@ import numpy.typing as npt
 
 from hfg.encoding.arrays import Lease, array_problem
 from hfg.errors import SharedMemoryError, UsageError
-from hfg.sharedmemory.layout import HEAD, LANE_SIZE, MAGIC, MOST_SLOTS, PAGE, WORDS, pages, segment_size
+from hfg.sharedmemory.layout import HEAD, LANE_SIZE, MAGIC, MOST_LANE, MOST_SLOTS, PAGE, WORDS, pages, segment_size
 from hfg.sharedmemory.names import create, remove
 
 __all__ = ["Ring", "RingCounts"]
@@ -143,7 +144,6 @@ class Ring:
         self._turns = threading.RLock()
         self._loans: dict[int, tuple[int, int]] = {}  # by id of the array: slot and address
         self._lanes: dict[int, _Lane] = {}
-        self._admitted = 0
         self._closed = False
         HEAD.pack_into(self._mapped, 0, MAGIC, slots, self.slot_size)
 
@@ -167,9 +167,9 @@ class Ring:
           SharedMemoryError: there is no room.
         """
         self._must_be_open()
-        self._admitted += 1
-        self._lanes[self._admitted] = _Lane(f"{self.name}.{self._admitted}", len(self._slots))
-        return self._admitted
+        number = 1 + secrets.randbelow(MOST_LANE)  # one that no other user can take first, as the next of a row
+        self._lanes[number] = _Lane(f"{self.name}.{number}", len(self._slots))
+        return number
 
     def dismiss(self, lane: int) -> None:
         """Free the slots that a dead consumer holds; anything that it still writes has no effect."""

@@ -294,7 +294,8 @@ class OutgoingEnd(_NearEnd):
         machine = sender.machine
         self._lending = Lending(
             world.run,
-            segment_of(world.run, world.incarnations[edge.source], edge.number),
+            world.incarnations[edge.source],
+            edge.number,
             edge.label,
             edge.window,
             lambda: machine.unfinished,
@@ -476,7 +477,7 @@ class IncomingEnd(_NearEnd):
         Raises:
           Untrue: it is not of this incarnation and edge.
         """
-        if message.segment != self._segment(incarnation=self._lent_by):
+        if message.segment.rpartition("_")[0] != self._segment(incarnation=self._lent_by):
             raise Untrue(f'of shared memory "{message.segment:.200}", which is not that of edge "{self._edge.label}"')
         if self._borrowing is not None:
             self._borrowing.open(message)

@@ -9,6 +9,7 @@ here waits. Depends on `hfg.sharedmemory` and `messages`.
 from __future__ import annotations
 
 import math
+import secrets
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -43,7 +44,10 @@ def segments_of(run: str) -> str:
 
 
 def segment_of(run: str, incarnation: int, edge: int) -> str:
-    """Return the name of the ring of an edge; each incarnation of its producer has its own."""
+    """Return the beginning of the name of an edge's ring, up to the last "_"; each incarnation of its producer has one.
+
+    What follows is random: whoever has seen the name of one ring could otherwise take the names of all that follow.
+    """
     return segment_name(_REALM, run.rpartition("/")[2], incarnation, f"edge_{edge}")
 
 
@@ -83,7 +87,8 @@ class Lending:
     def __init__(
         self,
         run: str,
-        segment: str,
+        incarnation: int,
+        edge: int,
         label: str,
         window: int,
         unfinished: Callable[[], int],
@@ -93,7 +98,8 @@ class Lending:
 
         Args:
           run: the name by which all parts know the run.
-          segment: name of the ring.
+          incarnation: of the producer.
+          edge: its number.
           label: label of the edge.
           window: how many tokens may be in transit.
           unfinished: returns how many are in transit, according to the link.
@@ -101,7 +107,8 @@ class Lending:
         """
         self.ring: Ring | None = None
         self._run = run
-        self._segment = segment
+        self._incarnation = incarnation
+        self._segment = f"{segment_of(run, incarnation, edge)}_{secrets.token_hex(4)}"
         self._label = label
         self._slots = window + _SPARE
         self._most = self._window = window
@@ -194,15 +201,19 @@ class Lending:
 
     def _make(self, size: int) -> None:
         try:
-            sweep_run(self._run)  # a previous incarnation of this part may have left a large one
+            if self._incarnation > 1:
+                sweep_run(self._run)  # a previous incarnation of this part may have left a large one
             slots = max(1 + _SPARE, min(self._slots, _MOST_SLOTS, _LARGEST // size))
             self.ring = Ring(self._segment, slots, size, smallest=_SMALLEST)
             self._most = slots - _SPARE
             self._leases.extend([] for _ in range(self._unfinished()))
             self._offer()
         except (SharedMemoryError, OSError) as error:
-            _LOGGER.warning('edge "%s" copies its arrays: %s', self._label, error)
-            self.close()
+            self._give_up(error)
+
+    def _give_up(self, error: Exception) -> None:
+        _LOGGER.warning('edge "%s" copies its arrays: %s', self._label, error)
+        self.close()
 
     def _offer(self) -> None:
         assert self.ring is not None
@@ -216,7 +227,12 @@ class Lending:
             return
         self.ring.dismiss(self._lane)
         self._is_seen = False
-        self._offer()
+        try:
+            self._offer()
+        except (SharedMemoryError, OSError) as error:
+            if any(self._leases):  # without a lane, what is resent cannot be read
+                raise
+            self._give_up(error)
 
     def seen(self, message: Sees) -> None:
         """The consumer has opened what it was offered, or cannot."""
