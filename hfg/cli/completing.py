@@ -18,6 +18,8 @@ from typing import Final
 
 import typer
 
+from hfg.base.bounds import GRAPH_FILE_BYTES
+from hfg.base.whole import read_plain
 from hfg.cli.target import load_graph
 from hfg.graph import Graph, Subgraph
 from hfg.nodetypes.node import Node
@@ -89,7 +91,7 @@ def _inside(graph: Graph, before: str) -> Iterator[tuple[str, Node]]:
 def _graphs_in(file: Path) -> list[str]:
     """Names in a file that are graphs, or functions that promise one, as far as its text shows."""
     try:
-        body = ast.parse(file.read_bytes()).body
+        body = ast.parse(read_plain(file, GRAPH_FILE_BYTES.most)).body
     except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
         return []
     names = []

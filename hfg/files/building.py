@@ -186,8 +186,10 @@ class _Loading:
         """Return why a file cannot be included; None if it may be."""
         try:
             other = (path.parent / named).resolve()
+            is_there = other.is_file()
         except (OSError, ValueError, RuntimeError) as error:
-            return f'"{named:.80}" cannot be the name of a file ({error}); correct it'
+            why = getattr(error, "strerror", None) or error
+            return f'"{named:.80}" cannot be the name of a file ({why}); correct it'
         if Path(named).is_absolute() or not other.is_relative_to(self.allowed.project):
             return (
                 f'"{named:.80}" is outside of the project {self.allowed.project.name}; '
@@ -196,7 +198,7 @@ class _Loading:
         if other in around:
             ring = " -> ".join(one.name for one in [*around[around.index(other) :], other])
             return f"files that include each other have no end: {ring}; leave one of them out"
-        if not other.is_file():
+        if not is_there:
             return f'there is no file "{named:.80}" there; correct the name, from the folder of this file'
         return None
 

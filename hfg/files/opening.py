@@ -1,7 +1,7 @@
 """Gives the text of a file that somebody has named, or a finding why there is none.
 
-Files of every kind that hold graphs are opened here, so that all are refused in the same words. Depends on `findings`
-and bounds.
+Files of every kind that hold graphs are opened here, so that all are refused in the same words. Depends on `findings`,
+bounds and `whole`.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from hfg.base.bounds import GRAPH_FILE_BYTES
+from hfg.base.whole import read_plain
 from hfg.files.findings import Findings
 
 __all__ = ["SUFFIX", "bytes_of", "text_in"]
@@ -29,14 +30,13 @@ def bytes_of(path: Path, file: str, findings: Findings, *suffixes: str) -> bytes
       *suffixes: how the names of such files end; the first one is what is said.
     """
     try:
-        with path.open("rb") as stream:
-            return stream.read(GRAPH_FILE_BYTES.most + 1)
+        return read_plain(path, GRAPH_FILE_BYTES.most + 1)
     except IsADirectoryError:
         findings.add(file, 0, "", f"this is a folder; name a file in it that ends in {suffixes[0]}")
     except FileNotFoundError:
         findings.add(file, 0, "", f"there is no such file{_nearby(path, suffixes)}")
     except OSError as error:
-        findings.add(file, 0, "", f"it cannot be read ({error.strerror}); see who may read it")
+        findings.add(file, 0, "", f"it cannot be read ({error.strerror}); see what it is, and who may read it")
     except ValueError as error:  # a name with a zero in it
         findings.add(file, 0, "", f"it cannot be read ({error}); correct its name")
     return None

@@ -15,7 +15,8 @@ import pytest
 
 import hfg
 from hfg.base.whole import GrowingFile, need_writable, read_plain, write_whole
-from hfg.errors import SharedMemoryError, UsageError
+from hfg.cli.completing import targets
+from hfg.errors import FileError, SharedMemoryError, UsageError
 from hfg.files.writing import write_text
 from hfg.nodes.files.access import find_files
 from hfg.recording.writing import open_new
@@ -239,6 +240,23 @@ def test_what_is_no_plain_file_is_not_read(tmp_path: Path) -> None:
             read_plain(path, 10)
     (tmp_path / "file").write_bytes(b"0123456789abc")
     assert read_plain(tmp_path / "file", 10) == b"0123456789"
+
+
+def test_a_pipe_in_place_of_a_graph_file_is_refused(tmp_path: Path) -> None:
+    """Another user can exchange a file that a graph includes while the graph is loaded."""
+    os.mkfifo(tmp_path / "one.hfg.yaml")
+    with pytest.raises(FileError, match="not a plain file"):
+        hfg.load(tmp_path / "one.hfg.yaml")
+
+
+def test_the_tab_key_reads_no_file_that_is_larger_than_any_graph(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "large.py"
+    file.write_text("one = Graph()\n" + "#" * 1000)
+    assert targets(f"{file}:") == [f"{file}:one"]
+    monkeypatch.setenv("HFG_MOST_GRAPH_FILE_BYTES", "5")
+    assert targets(f"{file}:") == []
 
 
 def test_a_pipe_among_pictures_is_none_of_them(tmp_path: Path) -> None:

@@ -246,7 +246,8 @@ def test_a_broken_file_is_written_anew(plugin: Path, tmp_path: Path) -> None:
         assert titles(tmp_path) == ["polish"]
 
 
-@pytest.mark.parametrize("how", ["group", "link", "other"])
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("how", ["group", "link", "other", "pipe"])
 def test_a_file_that_another_user_could_have_written_is_not_read(
     plugin: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
 ) -> None:
@@ -260,6 +261,9 @@ def test_a_file_that_another_user_could_have_written_is_not_read(
     elif how == "link":
         kept.rename(tmp_path / "elsewhere.json")
         kept.symlink_to(tmp_path / "elsewhere.json")
+    elif how == "pipe":  # at which a search would wait forever
+        kept.unlink()
+        os.mkfifo(kept)
     else:
         monkeypatch.setattr(os, "geteuid", lambda: kept.stat().st_uid + 1)
     assert titles(tmp_path) == ["polish"]

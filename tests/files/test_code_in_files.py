@@ -172,3 +172,9 @@ def test_a_growing_file_takes_the_place_of_what_an_earlier_one_left() -> None:
 def test_a_name_of_a_module_may_be_too_long_for_a_file() -> None:
     file = write(f"hfg: 1\nnodes:\n  n: {{type: 'a{'9' * 5000}:n'}}")
     assert list(hfg.load(file).nodes) == ["n"]  # whose type is missing, like that of any other unknown module
+
+
+def test_a_name_of_an_included_file_may_be_too_long_for_the_system() -> None:
+    file = write(f"hfg: 1\nnodes:\n  n: {{file: {'a' * 5000}}}")
+    with pytest.raises(FileError, match="cannot be the name of a file"):
+        hfg.load(file)
