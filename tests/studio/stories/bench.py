@@ -258,7 +258,11 @@ class Story(Person):
         end = time.monotonic() + patience(10)
         while not true():
             assert time.monotonic() < end, f"it never held: {what}"
-            self.page.evaluate("new Promise(requestAnimationFrame)")
+            self.frame()
+
+    def frame(self) -> None:
+        """Wait for the page's next frame."""
+        self.page.evaluate("new Promise(requestAnimationFrame)")
 
     def start(self) -> None:
         """Start the run, and wait until it goes."""
@@ -285,6 +289,17 @@ class Story(Person):
         """Wait until a node receives more than it has."""
         before = self.bench.node(path).seen
         self.bench.until(lambda: self.graph[path].seen > before, f"{path} receives more")
+
+    def choose(self, first: str, *others: str) -> None:
+        """Select several nodes."""
+        self.select(first)
+        self.page.keyboard.down("Control")
+        self.frame()  # the canvas knows of the key
+        for path in others:
+            self.select(path)
+        self.page.keyboard.up("Control")
+        for path in (first, *others):
+            self.page.locator(f'[data-node="{path}"].sel').wait_for()
 
     def pin(self, node: str, port: str) -> None:
         """Show in a probe what a port of a node sends."""

@@ -14,6 +14,7 @@ import hfg
 from hfg.images import Gray
 
 __all__ = [
+    "LONG_S",
     "Clock",
     "Collect",
     "Drive",
@@ -30,6 +31,9 @@ __all__ = [
     "scaled",
     "workshop",
 ]
+
+LONG_S = 1000.0
+"""A duration that no story waits for: it holds a `Drive` until the story sets another one."""
 
 
 @hfg.node

@@ -8,9 +8,9 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.studio.stories.bench import Story
+from tests.studio.stories.graphs import LONG_S
 
 pytestmark = pytest.mark.slow
-LONG_S = 1000.0
 
 BRIGHT = """canvas => {
   const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;

@@ -23,14 +23,6 @@ def notes(story: Story, path: str = "") -> Any:
     return story.bench.call(lambda: dict(story.graph.notes(path)))
 
 
-def choose(story: Story, *paths: str) -> None:
-    story.select(paths[0])
-    story.page.keyboard.down("Control")
-    for path in paths[1:]:
-        story.select(path)
-    story.page.keyboard.up("Control")
-
-
 def height(frame: Locator) -> float:
     box = frame.bounding_box()
     assert box is not None
@@ -47,6 +39,7 @@ def test_a_note_is_written_moved_saved_and_undone(open_studio: Open, tmp_path: P
     story.press("Enter")
     story.bench.until(lambda: story.graph.notes("").get("note 1", {}).get("text") == "Slow lenses need a longer look.")
     note = story.page.locator('.note[data-annotation=" note 1"]')
+    story.settle()
     x, y = story.middle(note)
     before = notes(story)["note 1"]["at"]
     story.page.mouse.move(x, y)
@@ -65,7 +58,7 @@ def test_a_note_is_written_moved_saved_and_undone(open_studio: Open, tmp_path: P
 
 
 def test_a_frame_stays_around_its_nodes_wherever_they_go_and_whatever_they_are_called(story: Story) -> None:
-    choose(story, "scale", "check")
+    story.choose("scale", "check")
     story.press("Control+j")
     story.page.get_by_label("Name of the frame").fill("numbers")
     story.press("Enter")
@@ -84,7 +77,7 @@ def test_a_frame_stays_around_its_nodes_wherever_they_go_and_whatever_they_are_c
 
 
 def test_deleting_a_frame_leaves_what_is_in_it(story: Story) -> None:
-    choose(story, "scale", "check")
+    story.choose("scale", "check")
     story.press("Control+j")
     story.page.get_by_label("Name of the frame").press("Enter")
     story.bench.until(lambda: story.graph.notes("scale").get("frame") == "frame 1")
@@ -97,7 +90,7 @@ def test_deleting_a_frame_leaves_what_is_in_it(story: Story) -> None:
 
 
 def test_selected_nodes_are_aligned_in_one_step_of_the_history(story: Story) -> None:
-    choose(story, "scale", "check", "store")
+    story.choose("scale", "check", "store")
     story.page.get_by_role("button", name="Align left sides").click()
     story.bench.until(
         lambda: (

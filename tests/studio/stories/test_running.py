@@ -8,9 +8,9 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.studio.stories.bench import Story
+from tests.studio.stories.graphs import LONG_S
 
 pytestmark = pytest.mark.slow
-LONG_S = 1000.0
 
 
 def test_all_nodes_of_the_graph_are_on_the_page(story: Story) -> None:
