@@ -232,11 +232,11 @@ class Seeking:
 
         Of very many, only some are returned: of every other chunk, or of every tenth; of each channel evenly spread.
         """
-        indexes = [self._pieces[index].lists for index in inside]
+        wanted = frozenset(channels)
         last = bisect_right(self._begins, end)
         inside = range(min(bisect_right(self._ends, begin - 1), last), last)
-        lists = [self._pieces[index].lists for index in inside]
-        sizes = [sum(length for one, (_, length) in here.items() if one in wanted) for here in lists]
+        indexes = [self._pieces[index].lists for index in inside]
+        sizes = [sum(length for one, (_, length) in here.items() if one in wanted) for here in indexes]
         every = max(1, -(-sum(sizes) // _MARK_BYTES))
         found: dict[int, list[Array]] = {}
         for index in inside[::every]:
