@@ -15,6 +15,7 @@ import hfg
 from hfg.studio.replaying import Replay
 from tests.studio.recordings import recording_of
 from tests.studio.stories.bench import Story
+from tests.studio.stories.test_access import serious
 
 pytestmark = pytest.mark.slow
 
@@ -148,6 +149,12 @@ def test_nothing_of_a_recording_looks_as_if_it_could_be_changed(story: Story) ->
     expect(story.page.locator("#side")).to_contain_text("enabled")
     expect(story.page.locator("#side").locator("select, input, textarea")).to_have_count(0)
     expect(story.page.locator("#side")).not_to_contain_text("Breakpoint")
+
+
+def test_axe_finds_nothing_serious_in_a_recording(story: Story) -> None:
+    story.select("scale")
+    scrub(story, 1.0, 5.05)
+    assert serious(story) == []
 
 
 def test_a_recording_is_opened_from_the_list_of_files_and_a_graph_after_it(
