@@ -33,6 +33,11 @@ def set_parameters(graph: Graph, settings: Iterable[str]) -> None:
             raise TargetError(f'--param "{setting}" sets nothing: write --param node.parameter=value')
         node = _node(graph, place)
         ports = node.ports.parameters
+        if name not in ports and not node._type.is_there:
+            raise TargetError(
+                f'parameter "{place}.{name}" cannot be set: the type "{node._type.reference}" is not there; hfg check '
+                "says why"
+            )
         if name not in ports:
             there = ", ".join(ports) or "none"
             raise TargetError(f'node "{place}" has no parameter "{name}"; it has {there}')

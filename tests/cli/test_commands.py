@@ -126,6 +126,13 @@ def test_param_that_does_not_fit(hfg: Command, setting: str, sentence: str) -> N
     assert sentence in shown.err
 
 
+def test_a_param_of_a_type_that_is_not_there_is_refused_because_of_that(hfg: Command) -> None:
+    Path("gone.hfg.yaml").write_text("hfg: 1\nname: g\nnodes:\n  a: {type: gone:node}\n", encoding="utf-8")
+    shown = hfg("run", "gone.hfg.yaml", "--allow", "gone", "--param", "a.size=3")
+    assert (shown.code, shown.out) == (2, "")
+    assert 'parameter "a.size" cannot be set: the type "gone:node" is not there; hfg check says why' in shown.err
+
+
 def test_trace_holds_every_event_as_a_line(hfg: Command) -> None:
     assert hfg("run", TARGET, *VIRTUAL, "--trace", "run.jsonl").code == 0
     events = [json.loads(line) for line in Path("run.jsonl").read_text(encoding="utf-8").splitlines()]
