@@ -51,11 +51,19 @@ def _bytes(folder: Path) -> None:
     read_bytes.function(folder / "a")
 
 
+def _ports(folder: Path) -> None:
+    (folder / "a.hfg.yaml").write_text(
+        "hfg: 1\nnodes:\n  a: {type: 'hfg.nodes.flow:Merge', parameters: {values: 1000000000}}\n"
+    )
+    hfg.load(folder / "a.hfg.yaml")
+
+
 READERS: dict[str, Callable[[Path], object]] = {
     "HFG_MOST_CHUNK_BYTES": _chunk,
     "HFG_MOST_FILE_BYTES": _bytes,
     "HFG_MOST_GRAPH_FILE_BYTES": _graph,
     "HFG_MOST_JSON_VALUES": lambda folder: json_of(b"[1,2,3,4,5,6,7,8,9]", "it"),
+    "HFG_MOST_NODES_AND_PORTS": _ports,
     "HFG_MOST_PICTURE_PIXELS": lambda folder: need_fair_size(KINDS["picture"].samples()[0], "it"),
 }
 
@@ -66,6 +74,72 @@ def test_each_limit_is_kept_by_who_reads(bound: Bound, tmp_path: Path, monkeypat
     monkeypatch.setenv(bound.variable, "5")
     with pytest.raises(Exception, match=f"the limit is 5; if you trust it, set {bound.variable} to a larger number"):
         READERS[bound.variable](tmp_path)
+
+
+def doubled(times: int) -> list[hfg.commands.Command]:
+    """Return commands, the nodes of which double with each."""
+    return [
+        hfg.commands.AddSubgraph("box"),
+        hfg.commands.Add("hfg.testing.nodes:Counter", "box/counter"),
+        *(hfg.commands.Copy("box", f"box/copy {number}") for number in range(times)),
+    ]
+
+
+@pytest.mark.rule("L4")
+def test_copies_of_copies_do_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forty commands would make a million million nodes; a recording of a stranger may hold them."""
+    monkeypatch.setenv("HFG_MOST_NODES_AND_PORTS", "100")
+    graph = hfg.Graph("g")
+    with pytest.raises(hfg.errors.GraphError, match="would have 128 nodes and ports: the limit is 100"):
+        graph.edit(*doubled(40))
+    assert list(graph.nodes) == []
+    for command in doubled(5):
+        graph.edit(command)
+    with pytest.raises(hfg.errors.GraphError, match="would have 128 nodes and ports: the limit is 100"):
+        graph.edit(hfg.commands.Copy("box", "another"))
+    graph.undo()
+    graph.edit(hfg.commands.Copy("box", "another"))
+
+
+@pytest.mark.rule("L4")
+@pytest.mark.parametrize("how", ["add", "replace"])
+def test_all_ports_of_a_graph_are_counted_together(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HFG_MOST_NODES_AND_PORTS", "100")
+    graph = hfg.Graph("g")
+    merge = "hfg.nodes.flow:Merge"
+    graph.edit(hfg.commands.Add(merge, "a", {"values": 60}), hfg.commands.Add(merge, "b", {"values": 2}))
+    adds, replaces = hfg.commands.Add(merge, "c", {"values": 60}), hfg.commands.Replace("b", merge, {"values": 60})
+    with pytest.raises(hfg.errors.GraphError, match="nodes and ports: the limit is 100"):
+        graph.edit(adds if how == "add" else replaces)
+
+
+@pytest.mark.rule("L4")
+def test_files_that_include_each_other_again_and_again_do_not_fill_the_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Seven files of a kilobyte each make a thousand million nodes."""
+    monkeypatch.setenv("HFG_MOST_NODES_AND_PORTS", "1000")
+    for number in range(7):
+        node = f"{{file: f{number + 1}.hfg.yaml}}" if number < 6 else "{type: 'hfg.testing.nodes:Counter'}"
+        nodes = "".join(f"  n{one}: {node}\n" for one in range(9))
+        (tmp_path / f"f{number}.hfg.yaml").write_text(f"hfg: 1\nnodes:\n{nodes}")
+    assert len(hfg.load(tmp_path / "f5.hfg.yaml").nodes) == 9
+    with pytest.raises(hfg.errors.FileError, match=r'f3.hfg.yaml:\d+: "n\d": with this file the graph has 1,\d+ nodes'):
+        hfg.load(tmp_path / "f0.hfg.yaml")
+
+
+@pytest.mark.rule("L4")
+def test_ports_of_a_file_that_is_included_again_and_again_are_counted_each_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HFG_MOST_NODES_AND_PORTS", "1000")
+    merge = "{type: 'hfg.nodes.flow:Merge', parameters: {values: 400}}"
+    (tmp_path / "inner.hfg.yaml").write_text(f"hfg: 1\nnodes:\n  merge: {merge}\n")
+    (tmp_path / "outer.hfg.yaml").write_text(
+        "hfg: 1\nnodes:\n" + "".join(f"  n{number}: {{file: inner.hfg.yaml}}\n" for number in range(3))
+    )
+    with pytest.raises(hfg.errors.FileError, match="inner.hfg.yaml:.* would have 1,200 nodes and ports: the limit is"):
+        hfg.load(tmp_path / "outer.hfg.yaml")
 
 
 @pytest.mark.rule("L4")

@@ -10,7 +10,16 @@ from __future__ import annotations
 import os
 from typing import Final, NamedTuple
 
-__all__ = ["BOUNDS", "CHUNK_BYTES", "FILE_BYTES", "GRAPH_FILE_BYTES", "JSON_VALUES", "PICTURE_PIXELS", "Bound"]
+__all__ = [
+    "BOUNDS",
+    "CHUNK_BYTES",
+    "FILE_BYTES",
+    "GRAPH_FILE_BYTES",
+    "JSON_VALUES",
+    "NODES_AND_PORTS",
+    "PICTURE_PIXELS",
+    "Bound",
+]
 
 
 class Bound(NamedTuple):
@@ -42,6 +51,9 @@ CHUNK_BYTES: Final = Bound("HFG_MOST_CHUNK_BYTES", 256 * 2**20, "bytes of one ch
 FILE_BYTES: Final = Bound("HFG_MOST_FILE_BYTES", 2**30, "bytes of a file, line or array that is read whole")
 GRAPH_FILE_BYTES: Final = Bound("HFG_MOST_GRAPH_FILE_BYTES", 32 * 2**20, "bytes of a graph file or .apex file")
 JSON_VALUES: Final = Bound("HFG_MOST_JSON_VALUES", 10_000_000, "values in a JSON text, including keys")
+NODES_AND_PORTS: Final = Bound(
+    "HFG_MOST_NODES_AND_PORTS", 100_000, "nodes of included files, and nodes and ports that copies and vectors make"
+)
 PICTURE_PIXELS: Final = Bound("HFG_MOST_PICTURE_PIXELS", 2**27, "pixels of one image or video frame")
 
-BOUNDS: Final = (CHUNK_BYTES, FILE_BYTES, GRAPH_FILE_BYTES, JSON_VALUES, PICTURE_PIXELS)
+BOUNDS: Final = (CHUNK_BYTES, FILE_BYTES, GRAPH_FILE_BYTES, JSON_VALUES, NODES_AND_PORTS, PICTURE_PIXELS)

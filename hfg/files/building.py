@@ -16,6 +16,7 @@ from typing import Any, Final
 from typing_extensions import override
 
 from hfg import registry
+from hfg.base.bounds import NODES_AND_PORTS
 from hfg.base.logs import Log
 from hfg.encoding import find_reference
 from hfg.errors import EngineInternalError, FileError, GraphError, HfgError, TargetError
@@ -28,7 +29,7 @@ from hfg.graph.editing.boxes import box_type
 from hfg.graph.editing.document import NODE_OPTIONS, PORT_KINDS, BoxDocument, Document, NodeDocument
 from hfg.graph.editing.from_document import Builder, Key
 from hfg.graph.editing.making import fitting
-from hfg.graph.editing.steps import Steps
+from hfg.graph.editing.steps import Multiplied, Steps
 from hfg.graph.graph import Graph, Subgraph
 from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.naming import suggest
@@ -112,6 +113,8 @@ class _Loading:
         self.allowed = Allowed(path, allow)
         self.files: dict[Path, Read | None] = {}
         self.types: dict[Path, type[FileBox] | None] = {}
+        self.sizes: dict[Path, int] = {}  # nodes of a file with those of the files that it includes
+        self.multiplied = Multiplied()  # ports of vectors, of all files together
         self.absent: list[tuple[str, int, str, str]] = []  # file, line and path of types that are not there, and why
         self.later: list[tuple[int, int, Callable[[], None]]] = []  # see `Builder.later`, for all files together
 
@@ -167,12 +170,22 @@ class _Loading:
     def parts(self, read: Read, path: Path, around: list[Path]) -> dict[str, type[FileBox]]:
         """Return the types of the files that a document includes, by how it names them."""
         found: dict[str, type[FileBox]] = {}
+        size = 0
         for key, node in _nodes(read.document, ()):
-            if not node.file or node.file in found:
+            size += 1
+            if not node.file:
                 continue
-            box = self.part(read, (*key, "file"), node.file, path, around)
-            if box is not None:
-                found[node.file] = box
+            box = found.get(node.file) or self.part(read, (*key, "file"), node.file, path, around)
+            if box is None:
+                continue
+            size += self.sizes[box._file]
+            if size > NODES_AND_PORTS.most:
+                line = read.lines.get((*key, "file"), 0)
+                sentence = f"with this file the graph has {size:,} nodes: {NODES_AND_PORTS.remedy}"
+                self.findings.add(read.file, line, graph_path(key), sentence)
+                break
+            found[node.file] = box
+        self.sizes[path] = size
         return found
 
     def part(self, read: Read, key: Key, named: str, path: Path, around: list[Path]) -> type[FileBox] | None:
@@ -309,7 +322,7 @@ class _Builder(Builder):
     """Makes the contents of one file; reports instead of raising."""
 
     def __init__(self, loading: _Loading, level: Level, read: Read, parts: Mapping[str, type[FileBox]]) -> None:
-        super().__init__(level, Steps(level, loading.find))
+        super().__init__(level, Steps(level, loading.find, loading.multiplied))
         self.loading = loading
         self.read = read
         self.parts = parts

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import msgspec
 
+from hfg.base.bounds import NODES_AND_PORTS
 from hfg.errors import DeclarationError
 from hfg.nodetypes.description import EventSpec, InputSpec, NodeType, OutputSpec, SlotSpec
 from hfg.ports.slots import Slot
@@ -79,7 +80,7 @@ class Vectors:
 
         Raises:
           TypeError: a size is missing.
-          ValueError: a size is not an integer of 1 or more.
+          ValueError: a size is not an integer of 1 or more, or is larger than any may be.
         """
         found: dict[str, int] = {}
         for name, spec in self.pattern.vectors.items():
@@ -95,6 +96,10 @@ class Vectors:
                 raise ValueError(
                     f'{self.pattern.name} has 1 or more {spec.kind}s "{name}", got {name}={size!r}; write '
                     f"{self.pattern.qualname}({name}=3)"
+                )
+            if size > NODES_AND_PORTS.most:
+                raise ValueError(
+                    f'{self.pattern.name} cannot have {size:,} {spec.kind}s "{name}": {NODES_AND_PORTS.remedy}'
                 )
             found[name] = size
         return tuple(found[spec.like or name] for name, spec in self.pattern.vectors.items())

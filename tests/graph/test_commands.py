@@ -338,6 +338,7 @@ EDITED: list[list[c.Command]] = [
     [c.Promote("loud.by", "loud/first.factor", promoted=False), c.SetParameter("loud.by", 8)],
     [c.Enclose(("loud",), "around"), c.Disconnect("around/loud/first.out", "around/loud/second.value")],
     [c.Copy("loud", "again"), c.Remove("again/first")],
+    [c.Copy("loud", "loud/again"), c.Copy("loud", "loud/once more")],
     [c.Replace("loud/first", "hfg.testing.nodes:Scaled", {"factor": 2}), c.Note("loud/first", "text", "here")],
 ]
 

@@ -158,6 +158,7 @@ class Builder:
                 node = self.make(level, name, said, at, box)
                 if node is None:
                     continue
+                self.steps.need_room(node)
                 self.add(level, name, node, said, at)
                 self._record_node(level.path_to(name), said)
                 within = inside(node)

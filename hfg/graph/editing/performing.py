@@ -78,6 +78,7 @@ class _Interpreter:
 
     def _add(self, command: c.Add) -> None:
         node = made(command.type, command.parameters, command.path)
+        self.steps.need_room(node)
         self.steps.add(*level_and_name(self.root, command.path), node, command.options)
 
     def _addsubgraph(self, command: c.AddSubgraph) -> None:
@@ -91,9 +92,11 @@ class _Interpreter:
         node = node_at(self.root, command.path)
         around, name = level_and_name(self.root, command.to)
         _need_free(around, name, command.to)
+        self.steps.need_room(node, copy=True)
+        originals = list(nodes_within(node))  # now: a copy may be inside of its original
         copy, inner = copy_of(node, around)
         self.steps.do(NodeChange(around, name, copy, node._options, len(around.nodes), inner, added=True))
-        for one, other in zip(nodes_within(node), nodes_within(copy), strict=True):
+        for one, other in zip(originals, nodes_within(copy), strict=True):
             self.steps.set_notes(other, self.root.whole.notes.get(one, {}))
             self.steps.changes.append(NodeCopied(one, other))
 
@@ -106,7 +109,9 @@ class _Interpreter:
 
     def _replace(self, command: c.Replace) -> None:
         old = node_at(self.root, command.path)
-        self.replaced += replace(self.steps, old, made(command.type, kept(old, command), command.path))
+        new = made(command.type, kept(old, command), command.path)
+        self.steps.need_room(new)
+        self.replaced += replace(self.steps, old, new)
 
     def _move(self, command: c.Move) -> None:
         self.steps.move(node_at(self.root, command.path), command.group)

@@ -6,11 +6,13 @@ one way to build a graph from data. Depends on `changes` and `structure`.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 from typing import Any, Literal, TypeAlias, Unpack
 
 import msgspec
 
+from hfg.base.bounds import NODES_AND_PORTS
 from hfg.base.values import own_copy, same
 from hfg.encoding import Find
 from hfg.errors import GraphError
@@ -44,9 +46,35 @@ from hfg.graph.structure.places import side_of
 from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort
 
-__all__ = ["Promoted", "Steps", "edges_of"]
+__all__ = ["Multiplied", "Promoted", "Steps", "edges_of"]
 
 Promoted: TypeAlias = dict[str, list[ParameterPort[Any]]]
+
+
+class Multiplied:
+    """Counts the nodes and ports that data makes in few words: each copy may be copied, and a size is one number."""
+
+    def __init__(self, count: int = 0) -> None:
+        self.count = count
+
+    def add(self, more: int) -> None:
+        """Count more.
+
+        Raises:
+          GraphError: they are more than data may make.
+        """
+        self.count += more
+        if more and self.count > NODES_AND_PORTS.most:
+            raise GraphError(f"the graph would have {self.count:,} nodes and ports: {NODES_AND_PORTS.remedy}")
+
+
+def _parts_of(nodes: Iterable[Node]) -> int:
+    """Count nodes and the ports of their vectors."""
+    return sum(1 + _ports_of(node) for node in nodes)
+
+
+def _ports_of(node: Node) -> int:
+    return sum(one.size or 0 for one in node._type.vectors.values())
 
 
 class Steps:
@@ -58,10 +86,23 @@ class Steps:
       find: returns the code that values refer to; None allows only references that are tagged as such.
     """
 
-    def __init__(self, root: Level, find: Find | None = None) -> None:
+    def __init__(self, root: Level, find: Find | None = None, multiplied: Multiplied | None = None) -> None:
         self.root = root
+        self._multiplied = multiplied
         self.changes: list[Change] = []
         self.find = find
+
+    def need_room(self, node: Node, *, copy: bool = False) -> None:
+        """Check that a node with its vectors of ports is not too much for a graph; of a copy, with all inside it.
+
+        Raises:
+          GraphError: it is.
+        """
+        more = _parts_of(nodes_within(node)) if copy else _ports_of(node)
+        if more and self._multiplied is None:
+            self._multiplied = Multiplied(_parts_of(one for level in self.root.walk() for one in level.nodes.values()))
+        if self._multiplied is not None:
+            self._multiplied.add(more)
 
     def do(self, change: Change) -> None:
         """Make a change that was checked, and record it."""
