@@ -21,7 +21,7 @@ from hfg.base.logs import Log
 from hfg.base.loopback import OwnListener
 from hfg.errors import TargetError
 from hfg.studio.cookies import forget_secret, secret_of_port
-from hfg.studio.crowding import bounded_http
+from hfg.studio.crowding import CrowdedListener, bounded_http
 from hfg.studio.discreet import DiscreetWebSocket
 from hfg.studio.entrance import Entrance, is_loopback, need_guarded
 from hfg.studio.messages import LONGEST, FromPage, read
@@ -119,7 +119,7 @@ class Server:
         )
         self.address = f"{'https' if encrypted else 'http'}://{shown}:{port}/?token={self.entrance.token}"
         app = application(door, self.entrance, Path(os.environ.get("HFG_STUDIO_STATIC") or STATIC))
-        self._server = uvicorn.Server(_config(app, certfile, keyfile))
+        self._server = uvicorn.Server(_config(app, self._sockets, certfile, keyfile))
         self._thread = threading.Thread(target=self._live, name="hfg studio server", daemon=True)
 
     def _live(self) -> None:
@@ -140,10 +140,10 @@ class Server:
         forget_secret(self._port)
 
 
-def _config(app: Any, certfile: str | None, keyfile: str | None) -> uvicorn.Config:
+def _config(app: Any, sockets: list[socket.socket], certfile: str | None, keyfile: str | None) -> uvicorn.Config:
     return uvicorn.Config(
         app,
-        http=bounded_http(),
+        http=bounded_http(sockets),
         ws=DiscreetWebSocket,
         ws_max_size=LONGEST,
         ws_ping_interval=20.0,
@@ -194,7 +194,7 @@ def _bound(host: str, port: int) -> socket.socket:
     Raises:
       OSError: it cannot; the file name is the host.
     """
-    kind = OwnListener if is_loopback(host) else socket.socket
+    kind = OwnListener if is_loopback(host) else CrowdedListener
     try:
         listening = kind(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
         try:
