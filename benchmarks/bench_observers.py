@@ -1,4 +1,4 @@
-"""What looking at a run costs: a chain of 10 functions with nobody, statistics, a recorder, a tap.
+"""What looking at a run costs: a chain of 10 functions with nobody, statistics, a recorder, a tap, monitors.
 
 Measured: the wall time of a run divided by its hops, the best of several short runs in a fresh process; values are
 small integers and user code adds nothing. An observer's price is its case less `nobody`, on the same machine in turn.
@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import hfg
+from hfg import monitors as m
 
 LENGTH = 10
 REPEATS = 12
@@ -96,6 +97,17 @@ def tap(run: Any) -> Any:
     return run.tap("through_5.out")
 
 
+def monitors(run: Any) -> Any:
+    """Ten monitors, each at an edge of its own."""
+    edges = ["through.out", *(f"through_{number}.out" for number in range(2, LENGTH + 1))]
+    never: Any = {f"edge_{number}": m.never(m.sent(edge, _is_negative)) for number, edge in enumerate(edges)}
+    return m.watch(run, **never)
+
+
+def _is_negative(value: int) -> bool:
+    return value < 0
+
+
 def against(revision: str, pairs: int) -> None:
     """Compare with another revision and print the ratios."""
     root = Path(__file__).resolve().parent.parent
@@ -151,5 +163,6 @@ else:
             "recorder of the whole trace": recorder,
             "function at the trace": function,
             "tap on one edge of eleven": tap,
+            "ten monitors on ten edges": monitors,
         }.items()
     }

@@ -54,6 +54,7 @@ __all__ = [
     "HfgError",
     "MachineError",
     "MessageTooLarge",
+    "MonitorViolated",
     "NoAnswer",
     "NodeError",
     "NotRunning",
@@ -283,6 +284,10 @@ class Aborted(RunError):
 
 class QueueLimit(RunError):
     """The run could continue only with a longer queue, and its `capacity_limit` forbids it."""
+
+
+class MonitorViolated(RunError):
+    """A property that a monitor watches did not hold; the message has the stretch of the run that shows it."""
 
 
 class TeardownError(RunError):

@@ -47,6 +47,7 @@ FLOORS = {
     "hfg.parts": 6,
     "hfg.parts.transports": 5,  # finds them, and knows nothing of parts
     "hfg.catalogue": 6,
+    "hfg.monitors": 6,
     "hfg.cli": 7,
     "hfg.studio": 7,
     "hfg.pubsub": 7,
