@@ -181,9 +181,10 @@ class MapLookup(Step):
     unknown = hfg.Event(int)
 
     def process(self, key: int, places: Map) -> Point | None:
-        if key not in places:
-            self.unknown.trigger(key)
-        return places.get(key)
+        if key in places:
+            return places[key]
+        self.unknown.trigger(key)
+        return None
 
 
 # --- The mission.

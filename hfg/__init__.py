@@ -27,7 +27,7 @@ engine; code that waits starts in layer 5.
     7  cli      studio    pubsub    composing
     6  nodes    files   recording   reporting   parts   catalogue    also: testing (imports all; none imports it)
     5  engine   links.running                             outside: hfg_transports (imports layers 0-1 only)
-    4  activity   links   timeline
+    4  activity   analysis   links   timeline
     3  graph
     2  nodetypes   registry
     1  ports                transport   sharedmemory
@@ -47,6 +47,7 @@ from hfg.base.lazy import on_demand
 if TYPE_CHECKING:
     from hfg import errors
     from hfg.activity import StateMachine
+    from hfg.analysis import analyse_activity
     from hfg.base.clock import elapsed, now
     from hfg.base.logs import log
     from hfg.base.token import END, NO_MESSAGE, Token
@@ -87,6 +88,7 @@ __all__ = [
     "Subgraph",
     "Token",
     "VirtualTimeLoop",
+    "analyse_activity",
     "commands",
     "elapsed",
     "errors",
@@ -111,6 +113,7 @@ if not TYPE_CHECKING:
         __name__,
         {
             "activity": ("StateMachine",),
+            "analysis": ("analyse_activity",),
             "base.clock": ("elapsed", "now"),
             "base.logs": ("log",),
             "base.token": ("END", "NO_MESSAGE", "Token"),

@@ -34,6 +34,7 @@ FLOORS = {
     "hfg.registry": 2,
     "hfg.graph": 3,
     "hfg.activity": 4,
+    "hfg.analysis": 4,
     "hfg.links": 4,
     "hfg.links.running": 5,
     "hfg.links.pubsub": 5,

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from hfg.analysis.report import MAX_STATES, analyse_activity
 from hfg.cli import show
 from hfg.cli.options import AllowOption, ArgOption, TargetArgument
 from hfg.cli.target import load_graph
@@ -24,6 +25,12 @@ def check(
     target: TargetArgument,
     arg: ArgOption = None,
     allow: AllowOption = None,
+    activity: Annotated[
+        bool, typer.Option("--activity", help="Also prove what may be active together, and show how activity moves.")
+    ] = False,
+    states: Annotated[
+        int, typer.Option("--states", min=1, help="How many states of a part of the graph --activity looks at.")
+    ] = MAX_STATES,
     json: Annotated[bool, typer.Option("--json", help="Write the problems as JSON.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
@@ -46,9 +53,15 @@ def check(
         refused = {problem.path.rpartition(" -> ")[2] for problem in problems}  # consequences of the refusals
         found = graph.check()
         problems += [one for one in found if not (one.check == "unconnected-input" and one.path in refused)]
+    report = None
+    if activity and graph is not None and not any(problem.severity == "error" for problem in problems):
+        report = analyse_activity(graph, max_states=states)
+        problems += report.problems
     counts = {severity: sum(problem.severity == severity for problem in problems) for severity in SEVERITIES}
     costs = [] if graph is None or counts["error"] else list(costs_of_deaths(graph))
-    if json:
+    if json and activity:
+        show.json({"problems": problems + costs, "activity": None if report is None else report.as_data()})
+    elif json:
         show.json(problems + costs)
     else:
         for cost in costs:
@@ -56,6 +69,8 @@ def check(
             show.write(f"{cost.path}: {cost.what} ({cost.why}){remedy}\n")
         for problem in problems:
             show.write(f"{problem} [{problem.check}]\n")
+        for line in [] if report is None else report.lines():
+            show.write(f"{line}\n")
         name = target if graph is None else f'graph "{graph.name}"'
         show.write(f"{name}: {_count(counts['error'], 'error')}, {_count(counts['warning'], 'warning')}")
         show.write(f", {_count(counts['hint'], 'hint')}\n" if counts["hint"] else "\n")

@@ -303,6 +303,53 @@ def test_an_edge_that_is_refused_shows_the_line_that_draws_it(hfg: Command) -> N
     assert "graph.connect(source.out, graph.start)" in shown.out
 
 
+FORKS = """
+class Fork(hfg.Node):
+    left, right = hfg.Event(), hfg.Event()
+
+    @hfg.slot
+    def begin(self) -> None:
+        self.left.trigger()
+        self.right.trigger()
+
+
+class State(hfg.Node):
+    @hfg.slot
+    def begin(self) -> None: ...
+
+
+def forks() -> hfg.Graph:
+    graph = hfg.Graph("forks")
+    fork, one, other = graph.add(Fork()), graph.add(State(), name="one"), graph.add(State(), name="other")
+    graph.start.activates(fork.begin)
+    fork.left.activates(one.begin)
+    fork.right.activates(other.begin)
+    return graph
+"""
+
+
+def test_check_activity_shows_the_steps_by_which_two_nodes_become_active(hfg: Command) -> None:
+    with Path("halves.py").open("a", encoding="utf-8") as file:
+        file.write(FORKS)
+    shown = hfg("check", "halves.py:forks", "--activity")
+    assert shown.code == 0
+    assert (
+        """"fork", "one", "other": 5 states
+  at most one is active: not so, as these steps may show:
+    1. "fork" takes the activity from "start -> fork.begin" and sends left and right
+    then activity lies on "fork.left -> one.begin" and activity lies on "fork.right -> other.begin"
+"""
+        in shown.out
+    )
+    found = json.loads(hfg("check", "halves.py:forks", "--activity", "--json").out)
+    (region,) = found["activity"]["regions"]
+    assert region["at_most_one"]["holds"] is False
+    assert region["at_most_one"]["steps"][0]["path"] == "fork"
+    assert {problem["check"] for problem in found["problems"]} == {"activity-stays"}
+    assert "and more" in hfg("check", "halves.py:forks", "--activity", "--states", "2").out
+    assert hfg("check", TARGET, "--activity").out.startswith("no edge of the graph is active, so no node ever is\n")
+
+
 def test_check_tells_at_once_all_that_a_graph_refuses_and_what_else_is_wrong(hfg: Command) -> None:
     with Path("halves.py").open("a", encoding="utf-8") as file:
         file.write(

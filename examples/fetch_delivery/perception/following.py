@@ -168,35 +168,37 @@ class FollowPath(hfg.Node):
         speed = math.hypot(self.last.vx, self.last.vy) if self.last is not None else 0.0
         limits = Limits(speed=self.speed, near=self.near, aligned=self.aligned)
         twist = follow(self.way, localised, scan, speed, limits)
-        told = self._queue(scan.stamp, twist is None)
-        if twist is None and self.way.waits:
-            self.last, self.since = None, scan.stamp
-            return Twist()
-        if twist is None:
+        waited = self._has_waited(scan.stamp, twist is None)
+        if twist is None and not self.way.waits:
             self.way = self.last = None
             self.best = math.inf
             self.arrived.trigger()
             return Twist()
-        self._watch(localised, scan.stamp, told)
-        self.last = twist
-        return twist
+        stalled = None
+        if twist is None:
+            self.last, self.since = None, scan.stamp
+        else:
+            stalled, self.last = self._stalled(localised, scan.stamp), twist
+        # One firing passes the activity on only once, so each way through here sends once at most.
+        if waited:
+            self.blocked.trigger(0.0)
+        elif stalled is not None:
+            self.blocked.trigger(stalled)
+        return twist or Twist()
 
-    def _queue(self, now: float, stands: bool) -> bool:
-        """Signal if it has waited for too long.
-
-        Return whether it has, because one firing passes the activity on only once.
-        """
+    def _has_waited(self, now: float, stands: bool) -> bool:
+        """Return whether it has waited for too long where it can wait for the goal."""
         if not self.way.waits:
             self.queues_since = None
         elif self.queues_since is None:
             self.queues_since = now if stands else None
         elif now - self.queues_since > self.queueing:
             self.queues_since = now
-            self.blocked.trigger(0.0)
             return True
         return False
 
-    def _watch(self, localised: Localised, now: float, told: bool) -> None:
+    def _stalled(self, localised: Localised, now: float) -> float | None:
+        """Return how far it still is if it has come no nearer for too long."""
         goal = self.way.points[-1]
         remaining = _ahead(self.way.points, localised.pose[:2], 0.0)[0]
         remaining += 0.3 * abs(float(wrapped(self.way.heading - localised.pose[2])))
@@ -207,8 +209,8 @@ class FollowPath(hfg.Node):
         elif now - self.since > self.patience:
             self.since = now
             self.best = remaining
-            if not told:
-                self.blocked.trigger(remaining)
+            return remaining
+        return None
 
     def _goal(self) -> Any:
         return self.goal_was

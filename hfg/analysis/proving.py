@@ -1,0 +1,154 @@
+"""Proofs that at most one, or exactly one, of some nodes is active, and counter-examples as steps.
+
+Four methods in order, each only if those before did not decide: *regions*, parts between which no activity moves;
+*counting*, whether any single step makes two out of one; the *concurrency relation*; and a *search* through all states.
+Depends on `game` and `searching`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from hfg.analysis.game import Game, Play, Rule
+from hfg.analysis.searching import Searched, pairs_together, search
+from hfg.graph.flat import ROOT
+
+__all__ = ["Claim", "Step", "Verdict", "regions_of", "steps_to", "verdict"]
+
+Claim: TypeAlias = Literal["at most one", "exactly one"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a counter-example.
+
+    Attributes:
+      text: what happens.
+      path: the node or subgraph that does it.
+      takes: the edge from which it takes activity, or "".
+      sends: what it sends: port, explicit modifier, how often.
+      times_out: it is the time-out of the node or subgraph.
+      active: the nodes that are active after it.
+      under_way: the edges on which activity lies after it.
+    """
+
+    text: str
+    path: str
+    takes: str
+    sends: tuple[tuple[str, int | None, int], ...]
+    times_out: bool
+    active: tuple[str, ...]
+    under_way: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a claim about some nodes holds in every run.
+
+    Attributes:
+      claim: "at most one" or "exactly one".
+      nodes: their paths.
+      holds: True: proved. False: the game reaches a state that breaks it, by `steps`. None: not decided.
+      method: what decided: "counting", "concurrency relation" or "search".
+      states: how many states were looked at.
+      steps: the counter-example, from the start of the run. Without steps, the start itself breaks the claim.
+      why: why it is not decided, and what to do.
+    """
+
+    claim: Claim
+    nodes: tuple[str, ...]
+    holds: bool | None
+    method: str
+    states: int = 0
+    steps: tuple[Step, ...] = ()
+    why: str = ""
+
+    def __str__(self) -> str:
+        nodes = f"{len(self.nodes)} nodes" if len(self.nodes) > 3 else ", ".join(f'"{path}"' for path in self.nodes)
+        result = {True: f"proved by {self.method}", False: f"broken in {len(self.steps)} steps", None: "not proved"}
+        why = f": {self.why}" if self.why else ""
+        return f"{self.claim} of {nodes} is active: {result[self.holds]}{why}"
+
+
+def regions_of(game: Game) -> list[list[int]]:
+    """Return the parts of a game between which no activity moves, in the order of their first nodes."""
+    leader = {index: index for index in game.nodes}
+
+    def find(index: int) -> int:
+        while leader[index] != index:
+            leader[index] = leader[leader[index]]
+            index = leader[index]
+        return index
+
+    for edge in game.edges:
+        ends = [edge.target.node] if edge.target.node > ROOT else []
+        if edge.source.node != ROOT:
+            ends += [one for one in game.members(edge.source.node) if one in leader]
+        for one in ends[1:]:
+            leader[find(one)] = find(ends[0])
+    found: dict[int, list[int]] = {}
+    for index in game.nodes:
+        found.setdefault(find(index), []).append(index)
+    return list(found.values())
+
+
+def verdict(play: Play, nodes: Iterable[int], claim: Claim, limit: int) -> Verdict:
+    """Decide a claim about nodes that take part in a play.
+
+    A node counts if it is active, and so does each activity in transit to one of them.
+    """
+    game = play.game
+    nodes = sorted(nodes)
+    paths = tuple(game.path(index) for index in nodes)
+    whole = play.nodes.issubset(nodes)
+    mask = play.mask if whole else game.places_of(nodes)
+    kept = claim == "at most one" or (whole and not any(map(_may_lose, play.rules)) and play.first != 0)
+    if kept and _counts(play):
+        return Verdict(claim, paths, True, "counting")
+    if kept and play.first.bit_count() < 2 and not _any_pair(play, mask):
+        return Verdict(claim, paths, True, "concurrency relation")
+
+    def is_broken(state: int) -> bool:
+        count = (state & mask).bit_count()
+        return count > 1 or (count == 0 and claim == "exactly one")
+
+    found = search(play, limit, is_broken)
+    states = len(found.reached)
+    if found.found is not None:
+        return Verdict(claim, paths, False, "search", states, tuple(steps_to(game, found, found.found)))
+    if found.is_complete:
+        return Verdict(claim, paths, True, "search", states)
+    why = (
+        f"the search ended at its limit of {limit} states, and none of them breaks it; a larger limit looks further "
+        "(max_states=, --states)"
+    )
+    return Verdict(claim, paths, None, "search", states, why=why)
+
+
+def _may_lose(rule: Rule) -> bool:
+    return rule.may_lose
+
+
+def _counts(play: Play) -> bool:
+    """Whether no step makes two out of one, so that "at most one" stays true forever."""
+    return play.first.bit_count() < 2 and all(rule.most_made < 2 for rule in play.rules)
+
+
+def _any_pair(play: Play, mask: int) -> bool:
+    return any(place & mask and others & mask for place, others in pairs_together(play).items())
+
+
+def steps_to(game: Game, found: Searched, state: int) -> Iterator[Step]:
+    """Yield the steps that lead to a state."""
+    for rule, after in found.way_to(state):
+        yield Step(
+            text=rule.text,
+            path=game.path(rule.actor),
+            takes=game.edges[rule.take].label if rule.take >= 0 else "",
+            sends=rule.sent,
+            times_out=rule.kind == "times out",
+            active=tuple(game.active_in(after)),
+            under_way=tuple(game.under_way_in(after)),
+        )

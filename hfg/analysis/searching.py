@@ -1,0 +1,129 @@
+"""Two ways to decide what the game reaches: every state, breadth first; or which two places go together.
+
+The search is exact in the game and finds the shortest way to a state, but the number of states may explode. The
+concurrency relation (Kovalyov 1992) is polynomial, and finds at least every pair that occurs. Depends on `game`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from hfg.analysis.game import Play, Rule
+
+__all__ = ["Searched", "pairs_together", "search"]
+
+
+@dataclass
+class Searched:
+    """The states that a search has reached, each with the state and rule that led to it.
+
+    Attributes:
+      reached: in the order in which they were found.
+      is_complete: nothing was left out.
+      found: the first state that was looked for, if any.
+    """
+
+    reached: dict[int, tuple[int, Rule] | None]
+    is_complete: bool
+    found: int | None
+
+    def way_to(self, state: int) -> list[tuple[Rule, int]]:
+        """Return the steps from the start to a state, and the state after each."""
+        way = []
+        before = self.reached[state]
+        while before is not None:
+            way.append((before[1], state))
+            state = before[0]
+            before = self.reached[state]
+        return way[::-1]
+
+
+def search(play: Play, limit: int, wanted: Callable[[int], bool] | None = None) -> Searched:
+    """Search breadth first, until a wanted state is found, nothing is left, or there are more states than the limit."""
+    reached: dict[int, tuple[int, Rule] | None] = {play.first: None}
+    waiting = [play.first]
+    for state in waiting:
+        if wanted is not None and wanted(state):
+            return Searched(reached, False, state)
+        for rule, after in play.steps_from(state):
+            if after not in reached:
+                if len(reached) >= limit:
+                    return Searched(reached, False, None)
+                reached[after] = (state, rule)
+                waiting.append(after)
+    return Searched(reached, True, None)
+
+
+def pairs_together(play: Play) -> dict[int, int]:
+    """Return for each place that may be marked the places that may be marked with it, as bits of their first bit.
+
+    A place that is in its own set may hold two tokens. Places of the right of A3 take part, those of -1 do not: they
+    take activity away, and what is left out then only makes the relation larger.
+    """
+    bits = play.game.bits
+    steps: list[tuple[int, list[int]]] = []  # from a place, to places
+    free: list[list[int]] = []  # what appears by itself
+    for rule in play.rules:
+        given = [bits.one[number] for number, count in rule.gives for _ in range(count)]
+        made = [bits.one[number] for number, count in rule.makes for _ in range(count)]
+        me = 1 << bits.node[rule.actor] if rule.actor in bits.node else 0
+        right = [1 << bits.right[rule.actor]] if rule.right else []
+        if rule.minus:
+            continue
+        if rule.kind == "is set":
+            free += [[me]] if rule.keeps == "active" else []
+        elif rule.clears:
+            mask = rule.needs & play.mask & _first_bits(play)
+            while mask:
+                low = mask & -mask
+                mask ^= low
+                steps.append((low, given))
+        elif rule.take >= 0:
+            steps.append((bits.one[rule.take], given or ([me] if rule.keeps == "active" else [])))
+        else:
+            if made:
+                free.append(made)
+            if given:
+                steps += [(place, given + right) for place in (me, *right)]
+    return _closed(play, steps, free)
+
+
+def _first_bits(play: Play) -> int:
+    """The bits that stand for a place: not those that say that there are several."""
+    return ~sum(play.game.bits.two)
+
+
+def _closed(play: Play, steps: list[tuple[int, list[int]]], free: list[list[int]]) -> dict[int, int]:
+    together: dict[int, int] = {}
+    changed = True
+
+    def mark(places: list[int], others: int) -> None:
+        nonlocal changed
+        for number, place in enumerate(places):
+            if place not in together:
+                together[place] = 0
+                changed = True
+            new = others
+            for other in (*places[:number], *places[number + 1 :]):
+                new |= other
+            if new & ~together[place]:
+                together[place] |= new
+                changed = True
+                while new:
+                    low = new & -new
+                    new ^= low
+                    together[low] = together.get(low, 0) | place
+
+    bits = play.game.bits
+    first = [bits.one[number] for number in play.game.start if bits.one[number] & play.mask]
+    mark(first, 0)
+    while changed:
+        changed = False
+        everything = sum(together)
+        for places in free:
+            mark(places, everything & ~places[0] if len(places) == 1 else everything)
+        for before, places in steps:
+            if before in together:
+                mark(places, together[before])
+    return together

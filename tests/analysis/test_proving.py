@@ -1,0 +1,276 @@
+"""At most one, exactly one, together, lost: what is proved of a graph before it runs (rules A3-A15, G2)."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+import hfg
+from examples.fetch_delivery.mission import build
+from hfg.analysis.game import Game, Play
+from hfg.analysis.proving import regions_of, verdict
+from hfg.analysis.searching import pairs_together, search
+from hfg.errors import GraphError, UsageError
+from hfg.graph.flat import flatten
+from hfg.nodes import activity
+
+
+class Step(hfg.Node):
+    """A state that ends in one of two ways."""
+
+    done = hfg.Event()
+    failed_to = hfg.Event()
+
+    @hfg.slot
+    def begin(self) -> None:
+        """Take the activity."""
+
+    @hfg.slot
+    def tick(self, well: bool) -> None:
+        (self.done if well else self.failed_to).trigger()
+
+
+class Both(Step):
+    """A state that leaves in both ways at once."""
+
+    @hfg.slot
+    def tick(self, well: bool) -> None:
+        self.done.trigger()
+        self.failed_to.trigger()
+
+
+def ring(kind: type[Step] = Step) -> hfg.Graph:
+    graph = hfg.Graph("ring")
+    one, other = graph.add(kind(), name="one"), graph.add(Step(), name="other")
+    graph.start.activates(one.begin)
+    one.done.activates(other.begin)
+    other.done.activates(one.begin)
+    return graph
+
+
+def test_a_machine_is_proved_by_counting() -> None:
+    report = hfg.analyse_activity(ring())
+    (region,) = report.regions
+    assert region.nodes == ("one", "other")
+    assert region.exactly_one.holds
+    assert region.exactly_one.method == "counting"
+    assert report.states() == [
+        ((), ("start -> one.begin",)),
+        (("one",), ()),
+        ((), ("one.done -> other.begin",)),
+        (("other",), ()),
+        ((), ("other.done -> one.begin",)),
+    ]
+    assert not report.may_be_active_together("one", "other")
+    assert not report.problems
+
+
+def test_a_fork_is_found_with_the_steps_that_lead_to_it() -> None:
+    graph = ring(Both)
+    graph["one"].failed_to.activates(graph["other"].begin)
+    found = hfg.analyse_activity(graph).at_most_one("one", "other")
+    assert found.holds is False
+    assert [step.text for step in found.steps] == [
+        '"one" takes the activity from "start -> one.begin"',
+        '"one.tick" is called and sends done and failed_to',
+    ]
+    assert found.steps[-1].under_way == ("one.done -> other.begin", "one.failed_to -> other.begin")
+    assert str(found) == 'at most one of "one", "other" is active: broken in 2 steps'
+
+
+def test_two_ways_out_of_which_each_firing_takes_one_are_no_fork() -> None:
+    graph = ring()
+    graph["one"].failed_to.activates(graph["other"].begin)
+    assert hfg.analyse_activity(graph).exactly_one("one", "other").holds
+
+
+def test_a_second_start_is_broken_at_once() -> None:
+    graph = ring()
+    graph.start.activates(graph["other"].begin)
+    found = hfg.analyse_activity(graph).at_most_one("one", "other")
+    assert found.holds is False
+    assert found.steps == ()
+
+
+def test_lost_activity_is_found() -> None:
+    graph = ring()
+    graph.connect(graph["other"].activated, graph["one"].deactivate)
+    report = hfg.analyse_activity(graph)
+    assert report.at_most_one("one", "other").holds
+    assert report.exactly_one("one", "other").holds is False
+    (problem,) = report.problems
+    assert problem.check == "activity-lost"
+
+
+def test_an_explicit_modifier_makes_activity_and_takes_it_away() -> None:
+    graph = ring()
+    makes, takes = graph.add(activity.ActivityGenerator(), name="makes"), graph.add(activity.InactivityGenerator())
+    graph.connect(graph.input("data", int), makes.value)
+    graph.connect(makes.out, graph["one"].begin, active=True)
+    takes.deactivation.activates(graph["one"].begin)
+    report = hfg.analyse_activity(graph)
+    assert report.at_most_one("one", "other").holds is False
+    lost = report.exactly_one("one", "other")
+    assert lost.holds is False
+
+
+def test_a_subgraph_that_times_out_gives_all_its_activity_for_one() -> None:
+    class Box(hfg.Subgraph):
+        begin = hfg.slot(type=object)
+
+        def build(self, graph: hfg.Graph) -> None:
+            both = graph.add(Both(), name="both")
+            left, right = graph.add(Step(), name="left"), graph.add(Step(), name="right")
+            self.begin.inner.activates(both.begin)
+            both.done.activates(left.begin)
+            both.failed_to.activates(right.begin)
+
+    graph = hfg.Graph()
+    box, after = graph.add(Box(), name="box", active_for_s=5), graph.add(Step(), name="after")
+    graph.start.activates(box.begin)
+    box.timeout.activates(after.begin)
+    report = hfg.analyse_activity(graph)
+    assert report.may_be_active_together("box/left", "box/right")
+    assert not report.may_be_active_together("after", "box/left")
+    assert report.at_most_one("after", "box/left").holds
+    assert not report.at_most_one("box").holds
+    assert report.without_limit == ["after"]
+
+
+def test_async_code_that_sends_twice_keeps_its_right_in_between() -> None:
+    """Another node works between the two sendings, so what it does counts, too (rule A3)."""
+
+    class Slow(Step):
+        @hfg.slot
+        async def tick(self, well: bool) -> None:
+            self.done.trigger()
+            self.failed_to.trigger()
+
+    graph = hfg.Graph()
+    slow, left, right = (graph.add(kind(), name=n) for kind, n in ((Slow, "slow"), (Step, "left"), (Step, "right")))
+    graph.start.activates(slow.begin)
+    slow.done.activates(left.begin)
+    slow.failed_to.activates(right.begin)
+    report = hfg.analyse_activity(graph)
+    assert report.may_be_active_together("left", "right")
+    assert report.at_most_one("left", "right").holds is False
+    assert report.may_be_active_together("slow", "left") is False
+
+
+def test_activity_on_a_discarded_token_goes_back_to_its_sender() -> None:
+    """The target of the active edge may be disabled: the sender stays or becomes active (rules A8, F10)."""
+    graph = ring()
+    graph.connect(graph.add(Step(), name="switch").done, graph["other"].disable)
+    found = hfg.analyse_activity(graph).exactly_one("one", "other")
+    assert found.holds
+
+
+def test_a_gate_keeps_a_node_from_sending() -> None:
+    class Fires(hfg.Node):
+        value = hfg.Input(int)
+        out = hfg.Event()
+
+        def process(self, value: int) -> None:
+            self.out.trigger()
+
+        @hfg.slot
+        def begin(self) -> None:
+            """Take the activity."""
+
+    def build(gated: bool) -> hfg.Graph:
+        graph = hfg.Graph()
+        fires, after, never = graph.add(Fires()), graph.add(Step(), name="after"), graph.add(Step(), name="never")
+        graph.connect(graph.input("data", int), fires.value)
+        graph.start.activates(fires.begin)
+        fires.out.activates(after.begin)
+        after.done.activates(fires.begin)
+        never.done.activates(fires.begin)
+        if gated:
+            graph.gate(fires, by=never)
+        return graph
+
+    assert hfg.analyse_activity(build(gated=False)).may_be_active("after")
+    report = hfg.analyse_activity(build(gated=True))
+    assert not report.may_be_active("after")
+    assert [problem.check for problem in report.problems] == ["activity-never-comes", "activity-stays"]
+
+
+def test_the_concurrency_relation_contains_every_pair_that_the_search_finds() -> None:
+    graph = ring(Both)
+    graph["one"].failed_to.activates(graph["other"].begin)
+    third = graph.add(Step(), name="third")
+    graph["other"].failed_to.activates(third.begin)
+    game = Game(flatten(graph))
+    (nodes,) = regions_of(game)
+    play = Play(game, nodes)
+    pairs = pairs_together(play)
+    found = search(play, 10_000)
+    assert found.is_complete
+    firsts = [place for place in pairs if any(state & place for state in found.reached)]
+    assert len(firsts) == len(pairs) == 8, "all places can be reached, and the relation has no other"
+    for state in found.reached:
+        for place in firsts:
+            for other in firsts:
+                if place != other and state & place and state & other:
+                    assert pairs[place] & other
+
+
+def test_a_limit_says_how_far_it_got_and_what_bounds_it() -> None:
+    graph = ring(Both)
+    graph["one"].failed_to.activates(graph["other"].begin)
+    third = graph.add(Step(), name="third")
+    graph["other"].failed_to.activates(third.begin)
+    report = hfg.analyse_activity(graph, max_states=3)
+    (region,) = report.regions
+    assert not region.is_complete
+    assert region.unproved == (
+        "3 states were looked at, and there are more: which can be left, and whether activity can be lost, is not "
+        "known; a larger limit looks further (max_states=, --states)"
+    )
+    found = report.at_most_one("third")
+    assert found.holds is None
+    assert "3 states" in found.why
+    assert "max_states=" in found.why
+    assert report.may_be_active("third"), "what was not looked at is possible"
+
+
+@pytest.mark.parametrize("limit", [0, -1, 1.5, True])
+def test_a_wrong_limit_is_refused(limit: object) -> None:
+    with pytest.raises(UsageError, match="max_states= is how many states to look at"):
+        hfg.analyse_activity(ring(), max_states=limit)  # type: ignore[arg-type]
+
+
+def test_an_unknown_path_is_refused() -> None:
+    report = hfg.analyse_activity(ring())
+    with pytest.raises(GraphError, match='no node or subgraph "three"'):
+        report.at_most_one("three")
+    with pytest.raises(UsageError, match="name the nodes"):
+        report.exactly_one()
+
+
+@pytest.mark.parametrize("robots", [1, 4])
+def test_exactly_one_state_of_the_delivery_mission_is_active(robots: int) -> None:
+    report = hfg.analyse_activity(build(robots=robots))
+    assert len(report.regions) == robots
+    for number, region in enumerate(report.regions):
+        assert len(region.nodes) == 43
+        assert region.exactly_one.holds
+        assert report.exactly_one(f"robot_{number}").holds
+    assert not report.problems
+    assert not report.unread
+
+
+def test_the_search_agrees_with_counting_about_the_mission() -> None:
+    """Two methods that share little are right or wrong together rarely."""
+    game = Game(flatten(build()))
+    play = Play(game, game.nodes)
+    counted = verdict(play, play.nodes, "exactly one", 10_000)
+    some = [index for index in play.nodes if not game.path(index).endswith("approach")]
+    searched = verdict(play, some, "at most one", 10_000)
+    assert counted.method == "counting"
+    assert searched.holds
+
+
+def test_a_report_is_plain_data() -> None:
+    data = hfg.analyse_activity(ring(Both)).as_data()
+    assert msgspec.json.decode(msgspec.json.encode(data)) == data
