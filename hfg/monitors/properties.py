@@ -35,11 +35,13 @@ class Verdict(enum.Enum):
       HOLDS: it has held so far; at the end of a run: it has held.
       VIOLATED: it did not hold.
       OPEN: something that it asks for has not come, and its time is not over.
+      UNKNOWN: a condition has raised, so nothing is judged any more.
     """
 
     HOLDS = "holds"
     VIOLATED = "violated"
     OPEN = "not yet"
+    UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True, slots=True)

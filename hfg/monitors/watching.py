@@ -194,6 +194,7 @@ class Monitors:
 
     def _break(self, one: _Watch, error: Exception) -> None:
         self.broken[one.name] = error
+        one.judge.verdict = Verdict.UNKNOWN
         _LOGGER.warning('monitor "%s" judges nothing more, because its condition raised %r', one.name, error)
         one.close()
 

@@ -159,7 +159,7 @@ def test_a_condition_that_raises_ends_its_monitor_and_nothing_else(caplog: pytes
             all=m.always(m.sent("ticks.out", lambda number: number < 10)),
         )
     assert set(found.broken) == {"odd"}
-    assert found.verdicts["all"] is Verdict.HOLDS
+    assert found.verdicts == {"odd": Verdict.UNKNOWN, "all": Verdict.HOLDS}
     assert 'monitor "odd" judges nothing more, because its condition raised ZeroDivisionError' in caplog.text
     with pytest.raises(MonitorViolated, match='monitor "odd" has judged nothing since its condition raised'):
         found.check()
