@@ -48,6 +48,7 @@ FOUND = (  # by the soak
     20268269,
     20268692,
     20269223,
+    30013297,
 )
 ORDERS = 50  # of permitted moves, where several would do
 MOST_MOVES = 1500

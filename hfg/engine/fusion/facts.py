@@ -145,7 +145,12 @@ class Facts:
     def _is_over_by_silence(self, k: int) -> bool:
         """Whether the silence of member k always ends the wave, because it silences all later members."""
         called = any(self.fires_with_slots(j) for j in range(k, len(self.order)))
-        return not called and not self._may_take(k) and self._silences_all_behind(k)
+        return not (called or self._may_take(k) or self._on_its_way(k)) and self._silences_all_behind(k)
+
+    def _on_its_way(self, k: int) -> list[str]:
+        """The locals that say whether activity of a member before k lies before one after it, which takes it (A6)."""
+        later = {giver for j in range(k + 1, len(self.order)) for giver in self._givers(j)}
+        return [f"m{giver}" for giver in sorted(later) if giver < k]
 
     def _odd_sending(self, k: int) -> str:
         """Whether more than values leaves with the firing."""

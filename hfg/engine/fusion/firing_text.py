@@ -148,7 +148,9 @@ class FiringText(Facts):
         return False
 
     def _over_by_silence(self, k: int, count: str, odd: list[str]) -> None:
-        """The wave is over, because all members after k are silent; unless calls wait there, which have their turns.
+        """The wave is over, because all members after k are silent.
+
+        Unless calls wait there, which have their turns, or activity lies there, which is taken in silence too.
 
         Args:
           k: the member.
@@ -156,7 +158,8 @@ class FiringText(Facts):
           odd: what else keeps the wave from being over.
         """
         say = self.say
-        odd = [*odd, *(f"c{j}" for j in range(k + 1, len(self.order)) if self.fires_with_slots(j))]
+        odd = [*odd, *self._on_its_way(k)]
+        odd += [f"c{j}" for j in range(k + 1, len(self.order)) if self.fires_with_slots(j)]
         if odd:
             say(f"if not ({' or '.join(odd)}):")
             self.indent += 1
