@@ -18,7 +18,7 @@ from hfg.studio.capturing import level_as_svg, value_as_file
 from hfg.studio.choosing import edge_options, gates, operators, promotions, stops
 from hfg.studio.clipboard import pasted, text_of_nodes
 from hfg.studio.following import Following
-from hfg.studio.leading_out import ways_out
+from hfg.studio.leading_out import shown_by, ways_out
 from hfg.studio.palette import search_types, type_of_reference
 from hfg.studio.places import place_at
 from hfg.studio.refusing import Refused
@@ -211,6 +211,10 @@ async def _ways_out(host: Following, args: _Path) -> Any:
     return ways_out(host.graph, args.path)
 
 
+async def _shown_by(host: Following, args: _Path) -> Any:
+    return shown_by(host.graph, args.path)
+
+
 async def _annotate(host: Following, args: Annotate) -> Any:
     return annotate(host.graph, args)
 
@@ -252,4 +256,5 @@ _ANSWERS: Final[Mapping[str, tuple[type[msgspec.Struct], Callable[[Following, An
     "amended": (_Amended, _amended),
     "annotate": (Annotate, _annotate),
     "ways_out": (_Path, _ways_out),
+    "shown_by": (_Path, _shown_by),
 }

@@ -274,7 +274,7 @@ def _parameter(spec: ParameterSpec, described: ParameterDescription) -> dict[str
         "high": _number(spec.maximum),
         "choices": None if spec.choices is None else [_choice(spec, one) for one in spec.choices],
         "labels": list(spec.labels),
-        "unit": spec.unit,
+        "unit": None if spec.unit == "1" else spec.unit,  # a plain number has none that people write
         "step": spec.step,
         "group": spec.group,
         "read_only": spec.read_only,

@@ -26,8 +26,8 @@ from hfg.nodetypes.description import NodeType
 from hfg.studio.describing import type_record
 from hfg.studio.records import TypeRecord
 from hfg.studio.refusing import Refused
-from hfg.studio.targets import Fit, end_of, fit_of
-from hfg.types import describe, why_not
+from hfg.studio.targets import end_of, fit_of
+from hfg.types import array_facts, describe, why_not
 
 __all__ = ["Row", "search_types", "type_of_reference", "warm_up"]
 
@@ -97,19 +97,32 @@ async def search_types(graph: Graph, words: str, port: str, category: str, most:
     hint = None if wire is None else type_of(wire[0])
     modules = {node._type.module for level in level_of(graph).walk() for node in level.nodes.values()}
     own = tuple(sorted(module for module in modules if not module.startswith("hfg.nodes")))
-    return await asyncio.to_thread(_search, own, words, hint, None if wire is None else wire[1], category, most)
+    begins = None if wire is None else wire[1]
+    return await asyncio.to_thread(_search, own, words, hint, begins, category, most, is_first=not modules)
 
 
 def _search(
-    own: tuple[str, ...], words: str, hint: Any, begins: bool | None, category: str, most: int
+    own: tuple[str, ...],
+    words: str,
+    hint: Any,
+    begins: bool | None,
+    category: str,
+    most: int,
+    *,
+    is_first: bool = False,
 ) -> dict[str, Any]:
+    """Find types; for the first node of a graph, sources come first, because nothing else would ever fire."""
     known = _all(own)
     numbers = ranked(known.index, words, typing=True) if words.strip() else range(len(known.types))
     types = [known.types[number] for number in numbers]
     chosen = [one for one in types if not category or one.category == category]
-    rows = [_row(one) if begins is None else _fitted(one, hint, begins) for one in chosen]
+    if is_first:
+        chosen.sort(key=lambda one: not one.source)
+    fitted = [(_row(one), 0) if begins is None else _fitted(one, hint, begins) for one in chosen]
     order = {"expects": 0, "": 0, "takes": 1, "refused": 2}
-    rows.sort(key=lambda row: order[row.fit])
+    named = bool(words.strip())  # the words say best what is meant
+    fitted.sort(key=lambda one: (order[one[0].fit], 0 if named else one[1]))
+    rows = [row for row, _ in fitted]
     return {
         "rows": rows[:most],
         "total": len(rows),
@@ -123,27 +136,38 @@ def _row(one: TypeDescription, fit: str = "", port: str = "", message: str = "")
     return Row(one.reference, one.title, one.name, one.category, one.summary, fit, port, message)
 
 
-def _fitted(one: TypeDescription, hint: Any, begins: bool) -> Row:
-    """Find the port of a type to which a wire fits best."""
+def _fitted(one: TypeDescription, hint: Any, begins: bool) -> tuple[Row, int]:
+    """Find the port of a type to which a wire fits best, and how far its type is from that of the wire."""
     kind = _kind(one.reference)
     if kind is None:
-        return _row(one, "refused", "", f"{one.title} cannot be found")
-    best: tuple[str, str] = ("", "")
-    reason = ""
+        return _row(one, "refused", "", f"{one.title} cannot be found"), _FAR
+    nearest: tuple[int, str] | None = None
+    takes, reason = "", ""
     for name, other in _ports(kind, begins):
         why = why_not(hint, other) if begins else why_not(other, hint)
-        fit: Fit = "refused" if why is not None else fit_of(other if begins else hint)
-        if fit == "expects":
-            return _row(one, fit, name)
-        if fit == "takes" and not best[0]:
-            best = fit, name
-        elif not reason:
+        if why is not None:
             verb = "expects" if begins else "sends"
-            reason = f"{one.title}.{name} {verb} {describe(other)}: {why}"
-    if best[0]:
-        return _row(one, *best)
+            reason = reason or f"{one.title}.{name} {verb} {describe(other)}: {why}"
+        elif fit_of(other if begins else hint) == "takes":
+            takes = takes or name
+        elif nearest is None or _distance(hint, other) < nearest[0]:
+            nearest = _distance(hint, other), name
+    if nearest is not None:
+        return _row(one, "expects", nearest[1]), nearest[0]
+    if takes:
+        return _row(one, "takes", takes), _FAR
     what = "takes nothing" if begins else "sends nothing"
-    return _row(one, "refused", "", reason or f"{one.title} {what}")
+    return _row(one, "refused", "", reason or f"{one.title} {what}"), _FAR
+
+
+_FAR: Final = 2
+
+
+def _distance(one: Any, other: Any) -> int:
+    """Return 0 for the same type, 1 for another array, `_FAR` for a type that merely takes such values, too."""
+    if describe(one) == describe(other):
+        return 0
+    return 1 if array_facts(one) is not None and array_facts(other) is not None else _FAR
 
 
 def _ports(kind: NodeType, begins: bool) -> Iterator[tuple[str, Any]]:

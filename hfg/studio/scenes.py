@@ -41,6 +41,7 @@ class _Look:
         self._host = host
         self._run = run
         self._taps: dict[str, Tap] = {}
+        self._values: dict[str, Any] = {}
 
     @property
     def now(self) -> float:
@@ -55,7 +56,9 @@ class _Look:
                 raise Refused("usage", f"a view looks at {_MOST_TAPS} ports at most", self.path)
             path = f"{self.path}/{port}" if "." in port else f"{self.path}.{port}"
             tap = self._taps[port] = self._run.tap(place_at(self._host.graph, path), size=1)
-        return None if tap.latest is None else tap.latest.value
+        if tap.latest is not None and not tap.latest.is_marker:
+            self._values[port] = tap.latest.value
+        return self._values.get(port)
 
     def active(self) -> list[str]:
         """See `Look`."""

@@ -321,3 +321,33 @@ def test_a_plot_that_cannot_be_written_says_why_and_leaves_the_old_file() -> Non
     Path("dir").mkdir()
     with pytest.raises(IsADirectoryError, match='cannot write "dir"'):
         fire(display.TimePlot(path="dir", every=1), value=1.0)
+
+
+class Looked:
+    """What a page looks at."""
+
+    path, now = "show", 1.0
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+    def latest(self, port: str) -> Any:
+        return self.value if port == "value" else None
+
+    def active(self) -> list[str]:
+        return []
+
+
+def shapes(value: Any) -> list[Any]:
+    scene = display.Show().newest(Looked(value))
+    assert scene is not None
+    return [(kind, more[0]) for kind, *more in scene.shapes]
+
+
+def test_what_is_shown_is_a_picture_or_lines_of_text() -> None:
+    ((kind, image),) = shapes(np.linspace(0, 1, 12, dtype=np.float32).reshape(3, 4))
+    assert (kind, image.dtype, int(image.max())) == ("image", np.uint8, 255)
+    assert shapes("two words") == [("text", "two words")]
+    assert shapes(3.5) == [("text", "3.5")]
+    assert len(shapes(list(range(1000)))) == 10
+    assert display.Show().newest(Looked(None)) is None

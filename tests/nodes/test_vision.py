@@ -13,6 +13,7 @@ import skimage.data
 
 import hfg
 from hfg.images import Gray
+from hfg.nodes import cv as cv_nodes
 from hfg.nodes import video, vision
 from hfg.testing import fire
 
@@ -243,6 +244,27 @@ def test_words_stay_within_the_picture_and_boxes_without_words_have_none() -> No
     columns = np.argwhere(named[:12, :68, 2])[:, 1]
     assert 20 < columns.min() < 50  # moved to the left, so that it can be read
     assert fire(vision.draw_boxes(), image=image, boxes=[]).outputs["out"].any() is np.False_
+
+
+def test_circles_are_drawn_and_counted_as_hough_finds_them() -> None:
+    image = np.zeros((100, 120), np.uint8)
+    for place in ((30, 40), (80, 60)):
+        cv2.circle(image, place, 15, 255, -1)
+    hough = cv_nodes.hough_circles(param2=12, min_radius=10, max_radius=20)
+    found = fire(hough, image=cv2.blur(image, (3, 3))).outputs["out"]
+    drawn = fire(vision.draw_circles(thickness=1), image=image, circles=found).outputs
+    assert drawn["found"] == 2
+    green = (drawn["out"][:, :, 1] > 150) & (drawn["out"][:, :, 0] < 100)
+    assert green[23:28, 28:33].any()  # the upper edge of the first one
+    assert not green[38:43, 28:33].any()
+    assert fire(vision.draw_circles(), image=image, circles=np.zeros((0, 3))).outputs["found"] == 0
+
+
+def test_circles_that_cannot_be_drawn_are_left_out_and_other_arrays_refused() -> None:
+    circles = np.array([[np.nan, 1, 1], [1e9, 1, 1], [5, 5, -1], [5, 5, 2]])
+    assert fire(vision.draw_circles(), image=np.zeros((9, 9), np.uint8), circles=circles).outputs["out"].any()
+    with pytest.raises(ValueError, match="rows of x, y and radius, got an array of 2 x 2"):
+        fire(vision.draw_circles(), image=np.zeros((9, 9), np.uint8), circles=np.zeros((2, 2)))
 
 
 def test_a_box_that_is_too_far_away_is_refused() -> None:

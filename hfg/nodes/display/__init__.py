@@ -2,6 +2,7 @@
 
 from hfg.nodes.display.images import ImageDisplay, image_grid
 from hfg.nodes.display.plots import HistogramPlot, ScatterPlot, TimePlot, VectorPlot
+from hfg.nodes.display.show import Show
 from hfg.nodes.display.text import Indicator, SignalLight, TextDisplay, format_table, log_value
 
 __all__ = [
@@ -9,6 +10,7 @@ __all__ = [
     "ImageDisplay",
     "Indicator",
     "ScatterPlot",
+    "Show",
     "SignalLight",
     "TextDisplay",
     "TimePlot",

@@ -7,7 +7,7 @@ These are OpenCV's objects: each keeps a detector or a matcher that is costly to
     _depth         StereoDepth, CameraCalibration
     _marks         find_bullseyes, find_quadrilaterals
     _improving     EqualizeLocally
-    _drawing       draw_boxes
+    _drawing       draw_boxes, draw_circles
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from hfg.nodes.vision._detecting import (  # noqa: E402
     PeopleDetector,
     qr_code,
 )
-from hfg.nodes.vision._drawing import draw_boxes  # noqa: E402
+from hfg.nodes.vision._drawing import Circles, draw_boxes, draw_circles  # noqa: E402
 from hfg.nodes.vision._improving import EqualizeLocally  # noqa: E402
 from hfg.nodes.vision._keypoints import KeypointDetector, match_descriptors  # noqa: E402
 from hfg.nodes.vision._marks import Bullseye, find_bullseyes, find_quadrilaterals  # noqa: E402
@@ -38,12 +38,14 @@ __all__ = [
     "CameraCalibration",
     "CascadeDetector",
     "ChessboardFinder",
+    "Circles",
     "EqualizeLocally",
     "KeypointDetector",
     "MarkerDetector",
     "PeopleDetector",
     "StereoDepth",
     "draw_boxes",
+    "draw_circles",
     "find_bullseyes",
     "find_quadrilaterals",
     "match_descriptors",

@@ -98,7 +98,7 @@ function Inner() {
       <ValueTip />
       {layout?.view === "activity" && <ActivityLegend layout={layout} />}
       <Zoomer showAll={view.showAll} />
-      {layout?.nodes.length === 0 && <p className="nothing-here">Nothing here yet. Press Tab to add a node, or drop a file.</p>}
+      {layout?.nodes.length === 0 && <p className="nothing-here">Nothing here yet. Press Tab, or click twice, to add a node.</p>}
     </main>
   );
 }

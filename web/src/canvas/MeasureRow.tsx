@@ -26,7 +26,7 @@ export function MeasureRow({ box, top, missing, failed, off }: Props) {
   const extra = useRef<HTMLDivElement>(null);
   const helper = isHelper(box);
   const isSubgraph = box.kind === "subgraph";
-  const wide = helper ? 56 : isBig(box) ? 64 : Math.min(96, Math.max(40, box.width - 136));
+  const wide = helper ? 56 : Math.min(isBig(box) ? 64 : 96, Math.max(40, box.width - 136));
   const tall = helper ? 14 : 16;
 
   useEffect(() => {
@@ -37,7 +37,7 @@ export function MeasureRow({ box, top, missing, failed, off }: Props) {
       if (canvas.current) drawBars(canvas.current, measure);
       if (!slow) return;
       if (median.current) median.current.textContent = measure.bars.length === 0 ? "–" : isSubgraph ? percent(measure.busyShare) : duration(measure.median);
-      if (speed.current) speed.current.textContent = measure.state === "working" && !(measure.rate > 0.05) ? "works" : rate(measure.rate);
+      if (speed.current) speed.current.textContent = measure.rate > 0.05 ? rate(measure.rate) : (SLOW[measure.state] ?? rate(0));
       if (extra.current) extra.current.textContent = more(measure, box.id);
     };
     if (canvas.current) drawBars(canvas.current, NOTHING);
@@ -79,6 +79,9 @@ export function MeasureRow({ box, top, missing, failed, off }: Props) {
     </>
   );
 }
+
+/** What a node does that has no rate to speak of. */
+const SLOW: Partial<Record<Measure["state"], string>> = { working: "works", ended: "ended" };
 
 const NOTHING: Measure = { state: "idle", active: false, bars: new Float32Array(), count: 0, median: 0, p99: 0, rate: 0, activeShare: 0, busyShare: 0 };
 

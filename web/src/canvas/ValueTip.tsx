@@ -40,7 +40,7 @@ export function ValueTip() {
         <b style={{ fontWeight: 600 }}>{path.replace(" -> ", " → ")}</b>
         <span className="muted">{type}</span>
       </div>
-      <div className="second num">{value ? value.message || value.summary || "nothing yet" : why || "nothing was sent yet"}</div>
+      <div className="second num">{value ? value.message || (value.kind === "marker" ? "silent: the last firing sent nothing here" : value.summary) || "nothing yet" : why || "nothing was sent yet"}</div>
       {value && (
         <div className="muted num" style={{ fontSize: 11 }}>
           {rate(value.rate_hz)} · {moment(value.time)} · <kbd>P</kbd> pin

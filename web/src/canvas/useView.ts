@@ -92,19 +92,23 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
     setPartly(isPartly(layout, view, element));
   }, [layout, flow, root, settle, fit]);
 
+  /** A node that is to be seen, as soon as it has a place. */
+  const wanted = useRef("");
+  const come = useCallback(() => {
+    const box = current.current?.nodes.find((one) => one.id === wanted.current);
+    const element = root.current;
+    if (!box || !element) return;
+    wanted.current = "";
+    const view = flow.getViewport();
+    const [x, y] = [box.x * view.zoom + view.x, box.y * view.zoom + view.y];
+    const inside = x > 0 && y > 0 && x + box.width * view.zoom < element.clientWidth && y + box.height * view.zoom < element.clientHeight;
+    if (!inside) void flow.setCenter(box.x + box.width / 2, box.y + box.height / 2, { zoom: Math.max(view.zoom, 0.6), duration: still.matches ? 0 : 200 });
+  }, [flow, root]);
+
   useEffect(() => {
     const reveal = (event: Event) => {
-      const path = (event as CustomEvent<string>).detail;
-      setTimeout(() => centre(path), 60);
-    };
-    const centre = (path: string) => {
-      const box = current.current?.nodes.find((one) => one.id === path);
-      const element = root.current;
-      if (!box || !element) return;
-      const view = flow.getViewport();
-      const [x, y] = [box.x * view.zoom + view.x, box.y * view.zoom + view.y];
-      const inside = x > 0 && y > 0 && x + box.width * view.zoom < element.clientWidth && y + box.height * view.zoom < element.clientHeight;
-      if (!inside) void flow.setCenter(box.x + box.width / 2, box.y + box.height / 2, { zoom: Math.max(view.zoom, 0.6), duration: still.matches ? 0 : 200 });
+      wanted.current = (event as CustomEvent<string>).detail;
+      setTimeout(come, 60);
     };
     window.addEventListener("hfg-show", reveal);
     window.addEventListener("hfg-show-all", showAll);
@@ -112,7 +116,9 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
       window.removeEventListener("hfg-show", reveal);
       window.removeEventListener("hfg-show-all", showAll);
     };
-  }, [flow, root, showAll]);
+  }, [come, showAll]);
+
+  useEffect(come, [layout, come]);
 
   return { level, partly, onMove, onMoveEnd, showAll };
 }

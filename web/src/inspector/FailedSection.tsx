@@ -1,5 +1,6 @@
 import type { Message } from "../protocol/types";
 import { ask, undo } from "../state/actions";
+import { portOf } from "../state/paths";
 import { useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
 
@@ -14,10 +15,10 @@ export function FailedSection({ path }: { path: string }) {
   return (
     <>
       {here.map((one) => (
-        <div className={one.severity === "error" ? "sec failed" : "sec"} key={one.what + one.why}>
+        <div className={one.severity === "error" ? "sec failed" : "sec"} key={one.path + one.what + one.why}>
           <h3>
             <Icon name="error" />
-            {one.what}
+            {one.path === path ? one.what : `${portOf(one.path)}: ${one.what}`}
           </h3>
           {one.why !== "" && <p style={{ margin: "4px 0" }}>{one.why}</p>}
           {one.remedy !== "" && <p className="second">{one.remedy}</p>}
@@ -41,7 +42,7 @@ export function FailedSection({ path }: { path: string }) {
                 {fix.text}
               </button>
             ))}
-            {error && last && (
+            {error && last && !fixes.some((fix) => fix.message.t === "undo") && (
               <button type="button" className="btn line" onClick={() => void undo()}>
                 Undo: {last.text}
               </button>

@@ -3,6 +3,7 @@ import { activeInside, elapsed } from "../state/looking";
 import { parentOf } from "../state/paths";
 import { change, studio, useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
+import { unwrapped } from "../ui/paragraphs";
 
 export function NodeHead({ path }: { path: string }) {
   const node = useStudio((s) => s.tables.nodes[path]);
@@ -47,7 +48,7 @@ function Doc({ text }: { text: string }) {
         Description
       </summary>
       <p className="doc" style={{ whiteSpace: "pre-wrap" }}>
-        {text}
+        {unwrapped(text)}
       </p>
     </details>
   );

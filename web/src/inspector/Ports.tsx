@@ -29,11 +29,11 @@ function PortRow({ port }: { port: PortRecord }) {
   useEffect(() => {
     const subscription = socket.subscribe("value", { path: port.path }, 4, (next) => {
       const one = next as Value | null;
-      if (value.current) value.current.textContent = one === null || one.kind === "none" || one.kind === "marker" ? "" : one.summary;
+      if (value.current) value.current.textContent = one === null || one.kind === "none" ? "" : one.kind === "marker" ? "silent" : one.summary;
       if (speed.current) speed.current.textContent = one !== null && one.seen > 0 ? rate(one.rate_hz) : "never";
     });
     return subscription.end;
-  }, [port.path]);
+  }, [port.path, port.used]);
   const round = port.kind === "slot" || port.kind === "event";
   return (
     <div className="prt">

@@ -55,7 +55,7 @@ export function OpenFile() {
         </ul>
         <label htmlFor="save-as">Save as</label>
         <div className="fld">
-          <input id="save-as" value={name} placeholder="name.hfg.yaml" onChange={(event) => setName(event.target.value)} />
+          <input id="save-as" autoFocus value={name} onKeyDown={(event) => event.key === "Enter" && name !== "" && void save(inside(named(name))).then((done) => done && close())} placeholder="name.hfg.yaml" onChange={(event) => setName(event.target.value)} />
         </div>
         <div className="actions">
           <button type="button" className="btn line" onClick={() => void tell("open", { path: "", discard: false }).then(close)}>
@@ -65,7 +65,7 @@ export function OpenFile() {
           <button type="button" className="btn" onClick={close}>
             Leave
           </button>
-          <button type="button" className="btn primary" disabled={name === ""} onClick={() => void save(inside(name)).then(close)}>
+          <button type="button" className="btn primary" disabled={name === ""} onClick={() => void save(inside(named(name))).then((done) => done && close())}>
             Save
           </button>
         </div>
@@ -73,3 +73,6 @@ export function OpenFile() {
     </div>
   );
 }
+
+const SUFFIX = ".hfg.yaml";
+const named = (name: string): string => (name.endsWith(SUFFIX) ? name : `${name}${SUFFIX}`);

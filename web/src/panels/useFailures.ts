@@ -1,5 +1,5 @@
 import { useEffect } from "react";
-import { show, toast } from "../state/actions";
+import { dropToast, show, toast } from "../state/actions";
 import { useStudio } from "../state/studio";
 import { moment } from "../ui/words";
 
@@ -12,7 +12,8 @@ export function useFailures(): void {
     if (error === null || run === undefined) return;
     const action = error.path ? { action: { label: "Show node", act: () => show(error.path) } } : {};
     const title = run.state === "ended" ? `The run has failed at ${moment(run.elapsed_s)}.` : `${error.path} has failed.`;
-    toast(error.message, { kind: "bad", title, ...action }, 0);
+    const said = toast(error.message, { kind: "bad", title, ...action }, 0);
+    return () => dropToast(said); // with the next run it is of the past
     // Only a new failure counts, not each new record of the same run.
   }, [error?.message, number]);
 }

@@ -1,9 +1,11 @@
 import { useEffect, useState } from "react";
-import type { Data, Value } from "../protocol/types";
-import { pin } from "../state/actions";
+import type { Command, Data, Value } from "../protocol/types";
+import { ask, edit, locked, pin, show } from "../state/actions";
 import { saveValue } from "../state/capturing";
 import { socket } from "../state/link";
 import { valueSeen } from "../state/looking";
+import { nodeOf } from "../state/paths";
+import { useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
 import { moment, rate, short } from "../ui/words";
 import { ImageView } from "./ImageView";
@@ -13,7 +15,13 @@ import { Plot } from "./Plot";
 export function Probe({ path }: { path: string }) {
   const [value, setValue] = useState<Value | null>(null);
   const [why, setWhy] = useState("");
-  useEffect(() => socket.subscribe("value", { path }, 4, (next, time) => setValue(valueSeen(next, time)), setWhy).end, [path]);
+  const port = useStudio((s) => s.tables.nodes[nodeOf(path)]?.ports.find((one) => one.path === path));
+  const used = port?.used;
+  useEffect(() => {
+    setWhy("");
+    return socket.subscribe("value", { path }, 4, (next, time) => setValue(valueSeen(next, time)), setWhy).end;
+  }, [path, used]);
+  const loose = port?.kind === "output" && !used;
   const shape = value?.shape ? ` · ${[...value.shape].join("×")}` : "";
   return (
     <section className="probe" aria-label={`Probe of ${path}`}>
@@ -26,8 +34,27 @@ export function Probe({ path }: { path: string }) {
         <span className="r num">{value ? `${value.kind === "number" ? value.summary : rate(value.rate_hz)}${shape}` : ""}</span>
       </header>
       {value && value.kind !== "none" && value.kind !== "marker" && <Saving path={path} kind={value.kind} />}
-      {value ? <Body path={path} value={value} /> : <div className="text">{why || "Nothing was sent yet."}</div>}
+      {loose ? <Loose path={path} /> : value ? <Body path={path} value={value} /> : <div className="text">{why || "Nothing was sent yet."}</div>}
     </section>
+  );
+}
+
+/** Nothing takes what this output sends, so nothing passes there that one could see. */
+function Loose({ path }: { path: string }) {
+  const why = locked();
+  const add = async () => {
+    const found = await ask<{ commands: Command[] }>({ t: "ask", what: "shown_by", args: { path } });
+    if (!found || !(await edit(found.commands))) return;
+    const added = found.commands.find((one) => one.do === "Add")?.path;
+    if (typeof added === "string") show(added);
+  };
+  return (
+    <div className="text" style={{ fontFamily: "inherit" }}>
+      <p>Nothing takes what it sends, so there is nothing to see.</p>
+      <button type="button" className="btn line" disabled={why !== ""} title={why || undefined} onClick={() => void add()}>
+        Add a node that shows it
+      </button>
+    </div>
   );
 }
 
@@ -52,6 +79,8 @@ function Saving({ path, kind }: { path: string; kind: Value["kind"] }) {
 function Body({ path, value }: { path: string; value: Value }) {
   if (value.message !== "") return <div className="text">{value.message}</div>;
   switch (value.kind) {
+    case "marker":
+      return <div className="text">Silent: the last firing sent nothing here.</div>;
     case "image":
       return <ImageView path={path} caption={`${value.summary} · ${moment(value.time)}`} />;
     case "number":

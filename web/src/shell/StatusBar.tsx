@@ -14,7 +14,7 @@ export function StatusBar() {
       <Problems />
       {run?.state === "ended" && <span className="num">run ended at {moment(run.elapsed_s)}</span>}
       <span className="num">
-        <b>{counted(nodes)}</b> nodes · <b>{counted(edges)}</b> edges
+        <b>{counted(nodes)}</b> {nodes === 1 ? "node" : "nodes"} · <b>{counted(edges)}</b> {edges === 1 ? "edge" : "edges"}
       </span>
       <Loads />
       <span className="spring" />

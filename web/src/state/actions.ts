@@ -10,11 +10,13 @@ let gestures = 0;
 
 export const newGesture = (): string => `${studio().hello?.viewer ?? 0}-${++gestures}`;
 
-export function toast(text: string, more: Partial<Omit<Toast, "id" | "text">> = {}, lasts = 6000): void {
+/** Says something; gives the number by which it can be taken away. */
+export function toast(text: string, more: Partial<Omit<Toast, "id" | "text">> = {}, lasts = 6000): number {
   const one: Toast = { id: ++toasts, kind: "plain", title: "", ...more, text };
   const others = studio().toasts.filter((other) => other.text !== text).slice(-2);
   change({ toasts: [...others, one] });
   if (lasts > 0) endings.set(one.id, window.setTimeout(() => dropToast(one.id), lasts));
+  return one.id;
 }
 
 const endings = new Map<number, number>();
@@ -298,6 +300,13 @@ export async function step(path: string): Promise<void> {
   if (answer?.why_not) toast(answer.why_not);
 }
 
-export async function save(path = "", force = false): Promise<void> {
-  if ((await tell("save", { path, force })) !== null) toast(`Saved as ${path || studio().tables.studio.file?.name || "the file"}`, {}, 2000);
+/** Writes the file; without a name asks for one. Whether it is written. */
+export async function save(path = "", force = false): Promise<boolean> {
+  if (path === "" && studio().tables.studio.file?.can_save === false) {
+    change({ popover: "open" });
+    return false;
+  }
+  if ((await tell("save", { path, force })) === null) return false;
+  toast(`Saved as ${path || studio().tables.studio.file?.name || "the file"}`, {}, 2000);
+  return true;
 }
