@@ -111,9 +111,31 @@ def read_plain(path: Path, most: int) -> bytes:
 
 
 def _open(target: Path, mode: Literal["ab", "wb"], buffering: int = -1) -> BinaryIO:
-    """Open what was checked: if its last part has become a link meanwhile, this fails."""
-    links = getattr(os, "O_NOFOLLOW", 0)
-    return open(target, mode, buffering, opener=lambda path, flags: os.open(path, flags | links, 0o666))
+    """Open what was checked, and check what was opened: meanwhile another user may have put something else there."""
+    return open(target, mode, buffering, opener=_open_trusted)
+
+
+def _open_trusted(path: str, flags: int) -> int:
+    """Do what `os.open` does, but wait at no pipe of another user, and empty no file of his."""
+    kind = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    try:
+        number = os.open(path, flags & ~os.O_TRUNC | kind, 0o666)
+    except OSError as error:
+        if error.errno != errno.ENXIO:
+            raise
+        _need_trusted(Path(path), os.lstat(path), is_last=True)
+        number = os.open(path, flags & ~os.O_TRUNC, 0o666)  # a pipe of ours waits for its reader
+    try:
+        there = os.fstat(number)
+        if hasattr(os, "geteuid"):
+            _need_trusted(Path(path), there, is_last=True)
+            os.set_blocking(number, True)
+        if flags & os.O_TRUNC and stat.S_ISREG(there.st_mode):
+            os.ftruncate(number, 0)
+    except BaseException:
+        os.close(number)
+        raise
+    return number
 
 
 def _target(path: Path) -> Path:
@@ -153,12 +175,17 @@ def need_trusted(path: Path) -> None:
             there = place.lstat()
         except FileNotFoundError:
             continue
-        is_link, is_pipe = stat.S_ISLNK(there.st_mode), stat.S_ISFIFO(there.st_mode)
-        if there.st_uid in (0, os.geteuid()) or stat.S_ISDIR(there.st_mode):
-            continue
-        if (place is path and (is_link or is_pipe)) or _is_in_the_way(place, there):
-            what = "symbolic link" if is_link else "pipe" if is_pipe else "file"
-            raise PermissionError(errno.EPERM, f"a {what} of another user is in its place; remove it", str(place))
+        _need_trusted(place, there, is_last=place is path)
+
+
+def _need_trusted(place: Path, there: os.stat_result, *, is_last: bool) -> None:
+    """Refuse one entry on the way to a file, or at its end."""
+    is_link, is_pipe = stat.S_ISLNK(there.st_mode), stat.S_ISFIFO(there.st_mode)
+    if there.st_uid in (0, os.geteuid()) or stat.S_ISDIR(there.st_mode):
+        return
+    if (is_last and (is_link or is_pipe)) or _is_in_the_way(place, there):
+        what = "symbolic link" if is_link else "pipe" if is_pipe else "file"
+        raise PermissionError(errno.EPERM, f"a {what} of another user is in its place; remove it", str(place))
 
 
 def _is_in_the_way(place: Path, there: os.stat_result) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 import hfg
+from hfg.base import whole
 from hfg.base.whole import GrowingFile, need_writable, read_plain, write_whole
 from hfg.cli.completing import targets
 from hfg.errors import FileError, SharedMemoryError, UsageError
@@ -125,6 +127,72 @@ def test_nothing_is_written_into_a_file_that_another_user_has_put_into_a_shared_
     with pytest.raises((OSError, UsageError), match="a file of another user is in its place|already exists"):
         write(shared / "one")
     assert (shared / "one").read_text() == "theirs"
+
+
+def comes_after_the_check(monkeypatch: pytest.MonkeyPatch, puts: Callable[[], object]) -> None:
+    """Another user tries all the time, so that at some point he comes between a check and what was checked for."""
+    check, has_come = whole.need_trusted, False
+
+    def checks(path: Path) -> None:
+        nonlocal has_come
+        check(path)
+        if not has_come:
+            has_come = True
+            as_nobody(puts)
+
+    monkeypatch.setattr(whole, "need_trusted", checks)
+
+
+@only_root
+@pytest.mark.parametrize("name", sorted(WRITES.keys() - {"a page, later"}))  # which writes nothing yet
+def test_nothing_waits_at_a_pipe_that_another_user_puts_there_after_the_check(
+    shared: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    comes_after_the_check(monkeypatch, lambda: os.mkfifo(shared / "one"))
+    with pytest.raises((OSError, UsageError), match="a pipe of another user is in its place|exists"):
+        WRITES[name](shared / "one")
+
+
+@only_root
+def test_no_pipe_that_another_user_listens_at_is_told_anything(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    comes_after_the_check(monkeypatch, lambda: os.mkfifo(shared / "one"))
+    opened, listening = os.open, []
+
+    def opens_while_he_listens(path: str, flags: int, mode: int = 0o777) -> int:
+        if path == str(shared / "one"):
+            listening.append(opened(path, os.O_RDONLY | os.O_NONBLOCK))
+        return opened(path, flags, mode)
+
+    monkeypatch.setattr(os, "open", opens_while_he_listens)
+    with pytest.raises(PermissionError, match="a pipe of another user is in its place"):
+        appends(shared / "one")
+    monkeypatch.undo()
+    assert os.read(listening[0], 100) == b""
+    os.close(listening[0])
+
+
+@only_root
+@pytest.mark.parametrize("name", ["at the end of a file", "a recording, by force"])
+def test_nothing_is_written_into_a_file_that_another_user_puts_there_after_the_check(
+    shared: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    comes_after_the_check(monkeypatch, lambda: (shared / "one").write_text("theirs"))
+    with pytest.raises((OSError, UsageError), match="a file of another user is in its place"):
+        WRITES[name](shared / "one")
+    assert (shared / "one").read_text() == "theirs"
+
+
+def test_a_pipe_of_ours_waits_for_its_reader(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    heard: list[bytes] = []
+    reader = threading.Thread(target=lambda: heard.append(pipe.read_bytes()))
+    writer = threading.Thread(target=appends, args=(pipe,))
+    writer.start()
+    reader.start()
+    writer.join()
+    reader.join()
+    assert heard == [b"mine"]
 
 
 @pytest.fixture
