@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from hfg.analysis.game import Game, Play, Rule
+from hfg.analysis.game import Game, Kind, Play, Rule
 from hfg.analysis.searching import Searched, pairs_together, search
 from hfg.graph.flat import ROOT
 
@@ -29,7 +29,7 @@ class Step:
       path: the node or subgraph that does it.
       takes: the edge from which it takes activity, or "".
       sends: what it sends: port, explicit modifier, how often.
-      times_out: it is the time-out of the node or subgraph.
+      kind: what happens: "fires", "is called", "sends", "takes", "times out" and so on.
       active: the nodes that are active after it.
       under_way: the edges on which activity lies after it.
     """
@@ -38,7 +38,7 @@ class Step:
     path: str
     takes: str
     sends: tuple[tuple[str, int | None, int], ...]
-    times_out: bool
+    kind: Kind
     active: tuple[str, ...]
     under_way: tuple[str, ...]
 
@@ -148,7 +148,7 @@ def steps_to(game: Game, found: Searched, state: int) -> Iterator[Step]:
             path=game.path(rule.actor),
             takes=game.edges[rule.take].label if rule.take >= 0 else "",
             sends=rule.sent,
-            times_out=rule.kind == "times out",
+            kind=rule.kind,
             active=tuple(game.active_in(after)),
             under_way=tuple(game.under_way_in(after)),
         )

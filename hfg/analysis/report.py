@@ -16,7 +16,7 @@ from hfg.analysis.searching import Searched, pairs_together, search
 from hfg.errors import GraphError, Problem, UsageError
 from hfg.graph.flat import ROOT, FlatGraph, flatten, scope_end
 from hfg.graph.graph import Graph
-from hfg.nodetypes.node import Node
+from hfg.nodetypes.node import Node, NodeType
 
 __all__ = ["ActivityReport", "Region", "analyse_activity"]
 
@@ -75,6 +75,7 @@ class ActivityReport:
             *(problem for number in range(len(self._plays)) for problem in self._problems_of(number)),
             *self._kept_by_time_out(),
             *self._half_active_slots(),
+            *self._unlike_their_kind(),
             *self._ungated(),
         ]
 
@@ -340,6 +341,33 @@ class ActivityReport:
                         why="the node that sends keeps its activity when the slot is called by this edge (rule A7)",
                         remedy="make it active, or look whether both nodes are to be active then",
                         check="half-active-slot",
+                    )
+                )
+        return problems
+
+    def _unlike_their_kind(self) -> list[Problem]:
+        """Events that lead no activity on, though those of all other nodes of the same type do."""
+        game, problems = self._game, []
+        leads: dict[tuple[NodeType, str], set[int]] = {}
+        of_type: dict[NodeType, list[int]] = {}
+        for index in game.nodes:
+            of_type.setdefault(game.flat.nodes[index].node._type, []).append(index)
+        for edge in game.edges:
+            if edge.source.node > ROOT and edge.source.kind == "event":
+                kind = game.flat.nodes[edge.source.node].node._type
+                if edge.source.name in kind.events:
+                    leads.setdefault((kind, edge.source.name), set()).add(edge.source.node)
+        for (kind, event), leading in leads.items():
+            others = [index for index in of_type[kind] if index not in leading]
+            if len(others) == 1:
+                problems.append(
+                    Problem(
+                        path=f"{game.path(others[0])}.{event}",
+                        severity="hint",
+                        what="no active edge begins here, although one does at all other nodes of this type",
+                        why=f"{kind.name} keeps its activity when it sends {event} (rule A5)",
+                        remedy="lead the activity on by an active edge, or look whether it is to stay",
+                        check="unlike-its-kind",
                     )
                 )
         return problems

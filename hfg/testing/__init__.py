@@ -8,6 +8,7 @@
     diagrams       token diagrams: drive a node by lines of characters
     recording      a recorder for traces
     invariants     what holds in every run
+    activity       play a counter-example of the analysis of activity in the engine
     exploring      run a graph under many schedules, give the smallest that fails
     strategies     Hypothesis: graphs, tokens, schedules      making, plans: their basis
     nodes          small deterministic node types
@@ -25,6 +26,7 @@ from typing import TYPE_CHECKING
 
 from hfg.base.lazy import on_demand
 from hfg.testing import diagrams, invariants
+from hfg.testing.activity import ActivityReplay, replay_activity
 from hfg.testing.conformance import Divergence, Replay, replay
 from hfg.testing.exploring import Exploration, ScheduleFailure, explore
 from hfg.testing.firing import Firing, fire
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
     from hfg.testing.values import values_of
 
 __all__ = [
+    "ActivityReplay",
     "Divergence",
     "Exploration",
     "Firing",
@@ -55,6 +58,7 @@ __all__ = [
     "recorder",
     "reference_run",
     "replay",
+    "replay_activity",
     "schedules",
     "tokens",
     "try_type",
