@@ -251,7 +251,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--verbose", "-v", action="store_true", help="write a line for each type as soon as it is done")
     given = parser.parse_args(arguments)
     if given.worker:
-        serve(_How, lambda reference, how: _Watch(reference, how).watch())
+        serve(_How, lambda references, how: (_Watch(one, how).watch() for one in references))
         return 0
     references, problems = references_of(given.what)
     found = endure(

@@ -1,8 +1,8 @@
 """Runs node types in processes of their own, so that one that crashes or hangs is named and the others still run.
 
 A worker is a new program, because the C library's checks of the heap are chosen as a program starts. It imports
-everything once and forks a process for each type. Memory and the size of files are limited, there is no standard input,
-and the output of nodes is discarded. Depends on the catalogue.
+everything once and forks a process for each type, or for a few. Memory and the size of files are limited, there is no
+standard input, and the output of nodes is discarded. Depends on the catalogue.
 """
 
 from __future__ import annotations
@@ -127,8 +127,8 @@ def _share(module: str, task: _Task, result: type[T], tell: Callable[[T], None] 
 # --- in the worker ---
 
 
-def serve(settings: type[T], work: Callable[[str, T], msgspec.Struct]) -> None:
-    """Be a worker: call `work` with each reference and the settings, and write its result."""
+def serve(settings: type[T], work: Callable[[list[str], T], Iterable[msgspec.Struct]]) -> None:
+    """Be a worker: call `work` with the references and the settings, and write its results."""
     task = msgspec.json.decode(sys.stdin.buffer.read(), type=_Task)
     how = msgspec.json.decode(task.how, type=settings)
     for module in dict.fromkeys(one.partition(":")[0] for one in task.references):
@@ -141,8 +141,8 @@ def serve(settings: type[T], work: Callable[[str, T], msgspec.Struct]) -> None:
     with sample_folder():
         pass  # its contents are made once, and not by each process
     with os.fdopen(os.dup(1), "wb") as answers:
-        for reference in task.references:
-            answers.write(msgspec.json.encode(work(reference, how)) + b"\n")
+        for result in work(task.references, how):
+            answers.write(msgspec.json.encode(result) + b"\n")
             answers.flush()
 
 

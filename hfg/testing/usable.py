@@ -1,4 +1,7 @@
-"""Tries many node types, each in a process of its own: `python -m hfg.testing.usable [MODULE or REFERENCE ...]`.
+"""Tries many node types in processes of their own: `python -m hfg.testing.usable [MODULE or REFERENCE ...]`.
+
+A process tries a few types, because a fork takes as long as trying one. A type that is not usable there, and all types
+of a process that died, are tried again, each in a process of its own.
 
 Depends on `trying` and `separate`.
 """
@@ -11,7 +14,7 @@ import resource
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import BinaryIO, Final
 
 import msgspec
@@ -23,6 +26,8 @@ __all__ = ["main", "try_all"]
 
 _MEMORY_BYTES: Final = 12 << 30
 _TOO_LONG: Final = "ended its process by SIGXCPU"
+_TOGETHER: Final = 16
+"""Types that one process tries at first."""
 
 
 class _How(msgspec.Struct):
@@ -43,7 +48,7 @@ def try_all(
     confirm: bool = True,
     processes: int = 1,
 ) -> list[Trial]:
-    """Try node types, each in a process of its own. Return the results in their order.
+    """Try node types in processes of their own. Return the results in their order.
 
     Args:
       references: "module:name" each.
@@ -60,8 +65,32 @@ def try_all(
     return in_processes("hfg.testing.usable", references, how, Trial, processes=processes)
 
 
+def _all_tried(references: list[str], how: _How) -> Iterator[Trial]:
+    for first in range(0, len(references), _TOGETHER):
+        some = references[first : first + _TOGETHER]
+        usable = {trial.reference: trial for trial in _tried_together(some, how) if trial.usable}
+        yield from (usable.get(one) or _tried(one, how) for one in some)
+
+
+def _tried_together(references: list[str], how: _How) -> list[Trial]:
+    """Try types one after the other in a forked process; return nothing if it dies, whichever type is the reason."""
+    with tempfile.TemporaryFile() as answers:
+
+        def try_them() -> None:
+            for reference in references:
+                _try(reference, how, answers)
+
+        def done() -> int:
+            return os.fstat(answers.fileno()).st_size
+
+        if forked(try_them, lambda _: 4 * how.limit_s, done, memory_bytes=_MEMORY_BYTES):
+            return []
+        answers.seek(0)
+        return [msgspec.json.decode(line, type=Trial) for line in answers]
+
+
 def _tried(reference: str, how: _How) -> Trial:
-    """Try a type in a forked process."""
+    """Try a type in a forked process of its own."""
     for _ in range(1 + how.confirm):
         with tempfile.TemporaryFile() as answer:
             died = forked(
@@ -90,7 +119,7 @@ def _try(reference: str, how: _How, answer: BinaryIO) -> None:
         trial = Trial(reference, fault=str(error))
     except BaseException as error:  # including those that leave the program
         trial = Trial(reference, fault=f"{reference}: {type(error).__name__}: {error}")
-    os.write(answer.fileno(), msgspec.json.encode(trial))
+    os.write(answer.fileno(), msgspec.json.encode(trial) + b"\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -101,7 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if given.worker:
         try_type("hfg.testing.nodes:double")  # the first trial of a process takes a second, a later one 30 ms
-        serve(_How, _tried)
+        serve(_How, _all_tried)
         return 0
     references, problems = references_of(given.what)
     trials = try_all(references, firings=given.firings, seed=given.seed, limit_s=given.limit, processes=given.processes)
