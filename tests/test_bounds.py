@@ -13,6 +13,7 @@ import hfg
 from hfg.base.bounds import BOUNDS, PICTURE_PIXELS, Bound
 from hfg.encoding.pictures import need_fair_size
 from hfg.encoding.plain import json_value
+from hfg.nodes.activity import Wait
 from hfg.nodes.files.reading import json_of, read_bytes
 from hfg.recording import File
 from tests.attacks.fuzzing import KINDS
@@ -58,7 +59,15 @@ def _ports(folder: Path) -> None:
     hfg.load(folder / "a.hfg.yaml")
 
 
+def _activity(_folder: Path) -> None:
+    graph = hfg.Graph("g")
+    for _ in range(6):
+        graph.start.activates(graph.add(Wait()).begin)
+    hfg.analyse_activity(graph)
+
+
 READERS: dict[str, Callable[[Path], object]] = {
+    "HFG_MOST_ACTIVE_EDGES": _activity,
     "HFG_MOST_CHUNK_BYTES": _chunk,
     "HFG_MOST_FILE_BYTES": _bytes,
     "HFG_MOST_GRAPH_FILE_BYTES": _graph,

@@ -18,7 +18,8 @@ from dataclasses import dataclass, field, replace
 from typing import Final, Literal, TypeAlias
 
 from hfg.analysis.reading import NOTHING, Bag, Handler, Sent, parts_of, read
-from hfg.graph.flat import ROOT, FlatGraph, FlatNode, scope_end
+from hfg.errors import GraphError
+from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.nodetypes.description import NodeType
 from hfg.ports.automatic import AUTOMATIC_EVENTS, sent_of
 
@@ -26,6 +27,7 @@ __all__ = ["Game", "Kind", "Play", "Rule", "Unread"]
 
 Kind: TypeAlias = Literal["fires", "is called", "sends", "takes", "loses", "gets back", "is set", "times out"]
 
+_MOST_GIVEN: Final = 2_000_000  # in all rules together
 _FRAGILE_TOGETHER: Final = 4  # up to this number of edges that may not be live, each combination is a case
 
 
@@ -126,9 +128,14 @@ class Game:
         self.start = list(self.out.get((ROOT, "start"), ()))
         self.unread: list[Unread] = []
         self.rules: list[Rule] = []
+        self._given = 0
         self._sent_from: dict[int, frozenset[str]] = {}
         for node, port in self.out:
             self._sent_from[node] = self._sent_from.get(node, frozenset()) | {port}
+        self._slot_edges: dict[int, list[FlatEdge]] = {}
+        for edge in flat.edges:
+            if edge.target.kind == "slot":
+                self._slot_edges.setdefault(edge.target.node, []).append(edge)
         self._gates = self._find_gates()
         self._fragile = self._find_fragile()
         self._ends = self._find_ending()
@@ -221,6 +228,12 @@ class Game:
         fragile = [number for number in gives if number in self._fragile]
         for missing in _subsets(fragile):
             gone = frozenset(missing)
+            self._given += len(gives)
+            if self._given > _MOST_GIVEN:
+                raise GraphError(
+                    f'"{self.path(index)}" sends activity in too many ways to analyse them: let fewer of its active '
+                    "edges lead to nodes that can be disabled"
+                )
             yield Rule(
                 text,
                 kind,
@@ -292,13 +305,12 @@ class Game:
             self.rules += self._sending(f'"{node.path}" ends', "fires", index, outputs)
         for number in self.into.get(index, ()):
             self._add_taking(node, number, code.slots)
-        for edge in self.flat.edges:
-            if edge.target.node == index and edge.target.kind == "slot":
-                if edge.target.name == "activate":
-                    self.rules.append(Rule(f'"{edge.label}" activates "{node.path}"', "is set", index, keeps="active"))
-                elif edge.target.name == "deactivate":
-                    text = f'"{edge.label}" deactivates "{node.path}"'
-                    self.rules.append(Rule(text, "is set", index, keeps="inactive"))
+        for edge in self._slot_edges.get(index, ()):
+            if edge.target.name == "activate":
+                self.rules.append(Rule(f'"{edge.label}" activates "{node.path}"', "is set", index, keeps="active"))
+            elif edge.target.name == "deactivate":
+                text = f'"{edge.label}" deactivates "{node.path}"'
+                self.rules.append(Rule(text, "is set", index, keeps="inactive"))
 
     def _add_automatic(self, node: FlatNode, ports: frozenset[str]) -> None:
         """Automatic events that carry activity on; each is a sending of its own (rule A9)."""
@@ -355,8 +367,8 @@ class Game:
                 left = _without(dict(gives), frozenset(missing))
                 if left:
                     self.rules.append(Rule(text, kind, end, gives=left, sent=sent, clears=mask | rights, needs=mask))
-        for edge in self.flat.edges:
-            if edge.target.node == end and edge.target.kind == "slot" and edge.target.name == "deactivate":
+        for edge in self._slot_edges.get(end, ()):
+            if edge.target.name == "deactivate":
                 text = f'"{edge.label}" deactivates "{scope.path}"'
                 self.rules.append(Rule(text, "is set", end, clears=mask | rights, needs=mask))
         for number in self.into.get(end, ()):  # a subgraph's own slots keep no activity

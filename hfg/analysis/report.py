@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from hfg.analysis.game import Game, Play, Unread
 from hfg.analysis.proving import Claim, Step, Verdict, regions_of, steps_to, verdict
 from hfg.analysis.searching import Searched, pairs_together, search
+from hfg.base.bounds import ACTIVE_EDGES
 from hfg.errors import GraphError, Problem, UsageError
 from hfg.graph.flat import ROOT, FlatGraph, flatten, scope_end
 from hfg.graph.graph import Graph
@@ -22,6 +23,12 @@ __all__ = ["ActivityReport", "Region", "analyse_activity"]
 
 MAX_STATES = 20_000
 """How many states of a region are looked at, unless another limit is given: about a second."""
+
+_BYTES_PER_STATE: Final = 13_000
+"""For each state of the limit, what the states of all regions together may take: 250 MiB with the usual limit."""
+
+_STATE_BYTES: Final = 300
+"""About what a state takes besides its bits."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +70,10 @@ class ActivityReport:
     def __init__(self, flat: FlatGraph, max_states: int) -> None:
         self._game = game = Game(flat)
         self._limit = max_states
+        self._bytes = max_states * _BYTES_PER_STATE
         self._plays = [Play(game, nodes) for nodes in regions_of(game)]
-        self._found = [search(play, max_states) for play in self._plays]
+        self._limits: list[int] = []
+        self._found = [self._searched(play) for play in self._plays]
         self._pairs: dict[int, dict[int, int]] = {}
         self.unread: list[Unread] = list(dict.fromkeys(game.unread))
         self.regions = [self._region(number) for number in range(len(self._plays))]
@@ -78,6 +87,14 @@ class ActivityReport:
             *self._unlike_their_kind(),
             *self._ungated(),
         ]
+
+    def _searched(self, play: Play) -> Searched:
+        """Search a region, within its share of the memory that is left."""
+        size = _STATE_BYTES + play.mask.bit_length() // 8
+        self._limits.append(max(1, min(self._limit, self._bytes // size)))
+        found = search(play, self._limits[-1])
+        self._bytes -= size * len(found.reached)
+        return found
 
     # --- questions
 
@@ -180,8 +197,8 @@ class ActivityReport:
 
     def _region(self, number: int) -> Region:
         play, found = self._plays[number], self._found[number]
-        at_most = verdict(play, play.nodes, "at most one", self._limit)
-        exactly = verdict(play, play.nodes, "exactly one", self._limit)
+        at_most = verdict(play, play.nodes, "at most one", self._limits[number])
+        exactly = verdict(play, play.nodes, "exactly one", self._limits[number])
         unproved = ""
         if not found.is_complete:
             unproved = (
@@ -470,6 +487,7 @@ def analyse_activity(graph: Graph, *, max_states: int = MAX_STATES) -> ActivityR
 
     Raises:
       UsageError: `max_states` is not a whole number of 1 or more.
+      GraphError: the graph has too many active edges, or too many ways to send activity over them.
 
     Examples:
       >>> import hfg
@@ -482,4 +500,11 @@ def analyse_activity(graph: Graph, *, max_states: int = MAX_STATES) -> ActivityR
         raise UsageError(f"max_states= is how many states to look at, 1 at least, got {max_states!r}")
     if not isinstance(graph, Graph):
         raise UsageError(f"analyse_activity takes a graph, got {graph!r:.80}: pass the hfg.Graph itself")
-    return ActivityReport(flatten(graph), max_states)
+    flat = flatten(graph)
+    active = sum(1 for edge in flat.edges if edge.active or edge.target.name == "activate")
+    if active > ACTIVE_EDGES.most:
+        raise GraphError(
+            f'graph "{graph.name}" has {active:,} edges that activate, too many to analyse its activity: '
+            f"{ACTIVE_EDGES.remedy}"
+        )
+    return ActivityReport(flat, max_states)

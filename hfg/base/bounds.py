@@ -11,6 +11,7 @@ import os
 from typing import Final, NamedTuple
 
 __all__ = [
+    "ACTIVE_EDGES",
     "BOUNDS",
     "CHUNK_BYTES",
     "FILE_BYTES",
@@ -47,6 +48,7 @@ class Bound(NamedTuple):
         return f"the limit is {self.most:,}; if you trust it, set {self.variable} to a larger number"
 
 
+ACTIVE_EDGES: Final = Bound("HFG_MOST_ACTIVE_EDGES", 5000, "active edges of a graph whose activity is analysed")
 CHUNK_BYTES: Final = Bound("HFG_MOST_CHUNK_BYTES", 256 * 2**20, "bytes of one chunk of a recording, unpacked")
 FILE_BYTES: Final = Bound("HFG_MOST_FILE_BYTES", 2**30, "bytes of a file, line or array that is read whole")
 GRAPH_FILE_BYTES: Final = Bound("HFG_MOST_GRAPH_FILE_BYTES", 32 * 2**20, "bytes of a graph file or .apex file")
@@ -56,4 +58,4 @@ NODES_AND_PORTS: Final = Bound(
 )
 PICTURE_PIXELS: Final = Bound("HFG_MOST_PICTURE_PIXELS", 2**27, "pixels of one image or video frame")
 
-BOUNDS: Final = (CHUNK_BYTES, FILE_BYTES, GRAPH_FILE_BYTES, JSON_VALUES, NODES_AND_PORTS, PICTURE_PIXELS)
+BOUNDS: Final = (ACTIVE_EDGES, CHUNK_BYTES, FILE_BYTES, GRAPH_FILE_BYTES, JSON_VALUES, NODES_AND_PORTS, PICTURE_PIXELS)
