@@ -32,6 +32,7 @@ MOST_MARKS: Final = 4000
 _KEPT_BYTES: Final = 64 * 2**20
 _MARK_BYTES: Final = 8 * 2**20  # of lists that are read for one stretch of time
 _FIELDS: Final = struct.Struct("<HIQQ")
+_TIME: Final = struct.calcsize("<HI")  # where the time is
 _PAIR: Final = np.dtype([("time", "<i8"), ("place", "<i8")])
 _FOREVER: Final = 2**63 - 1
 
@@ -153,15 +154,21 @@ class Seeking:
         data = self.file.unpacked(number)
         if data is None:
             return {}
-        pairs: dict[int, list[tuple[int, int]]] = {}
         try:
             places = content_of(data, lambda _opcode, _data: None).places
         except Damaged:
             return {}  # whatever is read from it later reports the damage
-        for place in places[::2]:
-            channel, _, time, _ = _FIELDS.unpack_from(data, place)
-            pairs.setdefault(channel, []).append((min(time, _FOREVER), place - HEAD.size))
-        return {channel: _in_order(np.array(found, _PAIR)) for channel, found in pairs.items()}
+        if not places:
+            return {}
+        # a small file may hold millions of empty messages: objects of Python for each would take gigabytes
+        begins = np.frombuffer(places, np.uint64)[::2].astype(np.int64)
+        channels = _numbers_at(data, begins, "<u2")
+        order = np.argsort(channels, kind="stable")
+        pairs = np.empty(len(begins), _PAIR)
+        pairs["time"] = np.minimum(_numbers_at(data, begins + _TIME, "<u8"), _FOREVER)[order]
+        pairs["place"] = begins[order] - HEAD.size
+        found, first = np.unique(channels[order], return_index=True)
+        return {int(channel): _in_order(part) for channel, part in zip(found, np.split(pairs, first[1:]), strict=True)}
 
     # --- messages by time ---------------------------------------------------------------------------------------------
 
@@ -310,6 +317,12 @@ def _body(data: bytes, place: int) -> bytes | None:
 
 
 _NONE: Final = np.empty(0, _PAIR)
+
+
+def _numbers_at(data: bytes, places: Array, kind: str) -> Array:
+    """Return the numbers that begin at some places."""
+    at_each = np.ndarray(len(data) - np.dtype(kind).itemsize + 1, kind, data, strides=(1,))
+    return at_each[places]
 
 
 def _in_order(pairs: Array) -> Array:
