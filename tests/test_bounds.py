@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import subprocess
 import sys
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from hfg.encoding.plain import json_value
 from hfg.nodes.activity import Wait
 from hfg.nodes.files.reading import json_of, read_bytes
 from hfg.recording import File
+from hfg.recording.chunks import content_of
 from tests.attacks.fuzzing import KINDS
 from tests.limits import patience
 
@@ -34,6 +36,9 @@ def test_a_variable_sets_a_limit_and_what_is_no_number_sets_none(
 ) -> None:
     monkeypatch.setenv(PICTURE_PIXELS.variable, said)
     assert PICTURE_PIXELS.most == most
+
+
+MESSAGE = struct.pack("<BQHIQQ", 5, 22, 1, 0, 7, 0)
 
 
 def _chunk(folder: Path) -> None:
@@ -69,6 +74,7 @@ def _activity(_folder: Path) -> None:
 READERS: dict[str, Callable[[Path], object]] = {
     "HFG_MOST_ACTIVE_EDGES": _activity,
     "HFG_MOST_CHUNK_BYTES": _chunk,
+    "HFG_MOST_CHUNK_MESSAGES": lambda folder: content_of(9 * MESSAGE, lambda _kind, _data: None),
     "HFG_MOST_FILE_BYTES": _bytes,
     "HFG_MOST_GRAPH_FILE_BYTES": _graph,
     "HFG_MOST_JSON_VALUES": lambda folder: json_of(b"[1,2,3,4,5,6,7,8,9]", "it"),

@@ -14,6 +14,7 @@ __all__ = [
     "ACTIVE_EDGES",
     "BOUNDS",
     "CHUNK_BYTES",
+    "CHUNK_MESSAGES",
     "FILE_BYTES",
     "GRAPH_FILE_BYTES",
     "JSON_VALUES",
@@ -50,6 +51,7 @@ class Bound(NamedTuple):
 
 ACTIVE_EDGES: Final = Bound("HFG_MOST_ACTIVE_EDGES", 5000, "active edges of a graph whose activity is analysed")
 CHUNK_BYTES: Final = Bound("HFG_MOST_CHUNK_BYTES", 256 * 2**20, "bytes of one chunk of a recording, unpacked")
+CHUNK_MESSAGES: Final = Bound("HFG_MOST_CHUNK_MESSAGES", 1_000_000, "messages of one chunk of a recording")
 FILE_BYTES: Final = Bound("HFG_MOST_FILE_BYTES", 2**30, "bytes of a file, line or array that is read whole")
 GRAPH_FILE_BYTES: Final = Bound("HFG_MOST_GRAPH_FILE_BYTES", 32 * 2**20, "bytes of a graph file or .apex file")
 JSON_VALUES: Final = Bound("HFG_MOST_JSON_VALUES", 10_000_000, "values in a JSON text, including keys")
@@ -58,4 +60,13 @@ NODES_AND_PORTS: Final = Bound(
 )
 PICTURE_PIXELS: Final = Bound("HFG_MOST_PICTURE_PIXELS", 2**27, "pixels of one image or video frame")
 
-BOUNDS: Final = (ACTIVE_EDGES, CHUNK_BYTES, FILE_BYTES, GRAPH_FILE_BYTES, JSON_VALUES, NODES_AND_PORTS, PICTURE_PIXELS)
+BOUNDS: Final = (
+    ACTIVE_EDGES,
+    CHUNK_BYTES,
+    CHUNK_MESSAGES,
+    FILE_BYTES,
+    GRAPH_FILE_BYTES,
+    JSON_VALUES,
+    NODES_AND_PORTS,
+    PICTURE_PIXELS,
+)

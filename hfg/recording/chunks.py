@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import lz4.frame  # type: ignore[import-untyped]
 import zstandard
 
-from hfg.base.bounds import CHUNK_BYTES
+from hfg.base.bounds import CHUNK_BYTES, CHUNK_MESSAGES
 
 __all__ = [
     "CHANNEL",
@@ -180,9 +180,11 @@ def content_of(data: bytes, declare: Callable[[int, bytes], None]) -> Content:
       declare: called with each schema and channel that is declared in it.
 
     Raises:
-      Damaged: the lengths of the records do not add up to the length of the chunk.
+      Damaged: the lengths of the records do not add up to the length of the chunk, or it has more messages than
+        `CHUNK_MESSAGES`: a few kilobytes may unpack to millions of empty ones, each of which takes time.
     """
     places = array("Q")
+    most = 2 * CHUNK_MESSAGES.most
     at, end = 0, len(data)
     while at < end:
         if at + HEAD.size > end:
@@ -195,6 +197,8 @@ def content_of(data: bytes, declare: Callable[[int, bytes], None]) -> Content:
         if opcode == MESSAGE:
             if length < _MESSAGE.size:
                 raise Damaged("a message in it is too short")
+            if len(places) >= most:
+                raise Damaged(f"it has more than {most // 2:,} messages, {CHUNK_MESSAGES.remedy}")
             places.extend((begin, at))
         elif opcode in (SCHEMA, CHANNEL):
             declare(opcode, data[begin:at])
