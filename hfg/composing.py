@@ -91,6 +91,12 @@ def _refusal(
     return next(filter(None, found), None)
 
 
+def _add_checks() -> None:
+    """Implement `hooks.add_checks`: the module adds its own when it is imported."""
+    import hfg.activity.analysis  # noqa: F401
+
+
+hooks.add_checks = _add_checks
 hooks.refusal = _refusal
 hooks.distribute = _distribute
 hooks.studio = _studio

@@ -22,6 +22,7 @@ class _Hooks:
       visit_studio: `hfg.studio.local.visit`, for other programs of the same user that steer a run.
       refusal: why a graph file may not name these references of node types and operators, references in values, or
         types, given which packages are allowed in addition; None if it may.
+      add_checks: adds the checks of graphs that upper layers have, once.
     """
 
     record: Callable[..., Any]
@@ -30,6 +31,7 @@ class _Hooks:
     studio: Callable[..., Any]
     visit_studio: Callable[..., Any]
     refusal: Callable[[Iterable[str], Iterable[str], Iterable[str], Iterable[str]], str | None]
+    add_checks: Callable[[], None]
 
 
 hooks = _Hooks()

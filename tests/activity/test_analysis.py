@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -351,3 +353,18 @@ def test_activity_that_stays_though_somebody_waits_until_it_leaves_is_told() -> 
     assert not build(active=True)
     assert not build(freed=True)
     assert not build(waited=False)  # a last state
+
+
+def test_a_graph_is_checked_for_activity_in_a_program_that_imports_only_hfg() -> None:
+    """Nothing else has to import the module that has the checks."""
+    program = (
+        "import hfg\n"
+        "class State(hfg.Node):\n"
+        "    @hfg.slot\n"
+        "    def enter(self) -> None: ...\n"
+        "graph = hfg.Graph()\n"
+        "graph.add(State(), active_for_s=3)\n"
+        "print([problem.check for problem in graph.check()])\n"
+    )
+    shown = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    assert "unheard-timeout" in shown

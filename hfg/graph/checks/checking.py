@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Final, TypeAlias
 
+from hfg.base.hooks import hooks
 from hfg.errors import SEVERITIES, Problem
 from hfg.graph.checks.changing import changed_inputs
 from hfg.graph.checks.edges import borders, joined_edges, promotions, unseen_parameters
@@ -80,6 +81,7 @@ def check(graph: HasLevel) -> list[Problem]:
 
 def check_flat(flat: FlatGraph) -> list[Problem]:
     """Check a graph that is flattened already; the worst first."""
+    hooks.add_checks()
     problems = list(flat.findings)
     for one in flat.walk():
         for look in _OF_EACH_LEVEL:
