@@ -121,6 +121,7 @@ def lay_out(graph: Graph, shown: Shown) -> dict[str, Any]:
     assert level is not None
     kind = cast("Kind | None", shown.view or None)
     places = {} if shown.deep else positions(level)
-    seen = View(kind, depth=None if shown.deep else 0, all_ports=not shown.deep, measured=True, places=places)
+    measured = kind != "activity"  # states have names only there
+    seen = View(kind, depth=None if shown.deep else 0, all_ports=not shown.deep, measured=measured, places=places)
     drawn: dict[str, Any] = msgspec.to_builtins(drawing.lay_out(level.face, seen))
     return {**drawn, "level": shown.path, "fixed": list(places), "deep": shown.deep}

@@ -14,6 +14,7 @@ import pytest
 import hfg
 from examples import fetch
 from examples.fetch_delivery.mission import robot
+from examples.figures import robot as robot_figures
 from hfg.graph.drawing import Layout, Line, NodeBox, View, lay_out
 from hfg.graph.structure.level import HasLevel
 from tests.graph.test_svg import State, at_random, join, mission, source, step
@@ -200,6 +201,21 @@ def test_the_view_activity_has_states_what_feeds_them_and_one_line_for_each_pair
     says = {(line.edges[0].source, line.edges[0].target): line.says for line in drawn.lines if line.is_active}
     assert says["robot_0/advance.done", "robot_0/fetch.begin"] == "done or 10.1 s"
     assert drawn.hidden > 30
+
+
+def test_what_several_lines_from_a_node_say_is_written_once() -> None:
+    drawn = lay_out(robot_figures.figure_19(), View(kind="activity", depth=0))
+    written = [(line.edges[0].source.partition(".")[0], line.says) for line in drawn.lines if line.says_at]
+    assert len(written) == len(set(written))
+    assert [says for _, says in written].count("cube") == 1
+    assert len([line for line in drawn.lines if line.says == "cube"]) > 1
+
+
+def test_a_node_with_bars_and_nothing_else_is_low() -> None:
+    drawn = lay_out(robot_figures.figure_19(), View(kind="mission", depth=0, measured=True))
+    for one in drawn.nodes:
+        has_rows = any(port.kind not in ("input", "output") or port.says for port in one.ports)
+        assert (one.height == 48) == (not has_rows), one.id
 
 
 # --- what holds for all graphs and views

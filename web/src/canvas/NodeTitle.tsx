@@ -31,7 +31,7 @@ export function NodeTitle({ box, record, top, plain }: Props) {
               </span>
             ),
           )}
-          {box.kind === "subgraph" && (
+          {box.kind === "subgraph" && !box.is_open && (
             <span className="badge num" title={`subgraph of ${box.inner} nodes; double click to enter`}>
               {record?.inside ?? box.inner}
               <Icon name="enter" />

@@ -77,14 +77,16 @@ function NodeViewPlain({ data }: NodeProps<HfgNode>) {
 /** What one sees of a node that is not far away. */
 function NodeInside({ box, look, plain, record }: { box: NodeBox; look: Look; plain: boolean; record: NodeRecord | undefined }) {
   const rows = rowsOf(box);
-  const top = box.is_open ? 2 : plain && !look.inside ? box.height / 2 - 10 : rows.title;
+  const named = box.ports.some((port) => port.kind === "slot" && port.says !== "");
+  const top = box.is_open ? (named && !plain ? 17 : 2) : plain ? box.height / 2 - (look.inside === null ? 10 : 18) : rows.title;
+  const measure = plain ? box.height / 2 + 1 : rows.measure;
   return (
     <>
       <i className="stripe" />
       {look.brk && <i className={look.brk.holds ? "brk holds" : "brk"} title="The run pauses here (F9)" />}
       <NodeTitle box={box} record={record} top={top} plain={plain} />
       {box.is_open ? null : look.inside !== null ? (
-        <WhereLine path={box.id} inside={look.inside} top={rows.measure} />
+        <WhereLine path={box.id} inside={look.inside} top={measure} />
       ) : (
         !plain && <MeasureRow box={box} top={rows.measure} missing={record?.missing ?? ""} failed={look.failed} off={record?.enabled === false} />
       )}

@@ -84,7 +84,7 @@ const Wire = memo(function Wire({ line, strands, over, full, hot, picked, off, p
       onPointerEnter={bundle ? () => over(keysOf(line).join()) : undefined}
       onPointerLeave={bundle ? () => over(null) : undefined}
     >
-      <path className="wire halo" d={path} style={line.is_active ? { strokeWidth: plain ? 10 : 9 } : undefined} />
+      <path className="wire halo" d={path} style={line.is_active ? { strokeWidth: 9 } : plain ? { strokeWidth: 4.5 } : undefined} />
       {line.is_active ? (
         <>
           <path className={`wire act${sync}${more}`} d={path} />

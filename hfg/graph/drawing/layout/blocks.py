@@ -53,6 +53,7 @@ _LEAST: Final = 22.0  # between ports side by side
 _MEASURED: Final = (72.0, 176.0)  # a node with bars
 _WIDER: Final = 1.05  # the letters of the page than those of drawings
 _SIGN: Final = 32.0  # of a node that waits, between its name and its badges
+_BARS: Final = 40.0  # where they end in a node that has nothing else
 _BELOW_BARS: Final = 54.0  # there rows of ports begin
 TAG_HEIGHT: Final = 14.0
 
@@ -88,7 +89,9 @@ def size(thing: Thing, *, measured: bool, inner: tuple[float, float] | None = No
         max(0.0, *(width_of(shortened(one.says, LONGEST_PORT), PORT) for one in sides[side]), 0.0)
         for side in ("left", "right")
     ]
-    header = _BELOW_BARS if measured and thing.shape.look == "node" else _header(thing, sides)
+    is_measured = measured and thing.shape.look == "node"
+    has_rows = any(one.says for side in sides.values() for one in side) or bool(sides["top"] + sides["bottom"])
+    header = (_BELOW_BARS if has_rows else _BARS) if is_measured else _header(thing, sides)
     wide = [_title_width(thing), *(sum(map(room, sides[side])) + _PAD for side in ("top", "bottom"))]
     named = [sides[side] for side in ("left", "right") if _is_named(sides[side])]
     rows = max((len(spots) + sum(bool(one.tagged) and one.is_linked for one in spots) for spots in named), default=0)
@@ -101,10 +104,10 @@ def size(thing: Thing, *, measured: bool, inner: tuple[float, float] | None = No
     if inner is not None:
         wide.append(inner[0] + 2 * 20.0)
         height = max(height, header + inner[1] + 32.0)
-    elif measured and thing.shape.look == "node":
+    elif is_measured:
         height, least = max(height, _MEASURED[0] if len(sides["top"] + sides["bottom"]) else 48.0), _MEASURED[1]
         wide += [least, _WIDER * _title_width(thing) + _SIGN]
-    thing.width, thing.height = up(max(*wide, 96.0)), up(height)
+    thing.width, thing.height = up(max(*wide, thing.least)), up(height)
     _place_upright(thing, sides, header)
     thing.left, thing.right = (_beside(sides[side]) for side in ("left", "right"))
     thing.top = max((TAG_HEIGHT + one.to_tag for one in sides["top"] if one.tagged), default=0.0)

@@ -217,6 +217,7 @@ class _Taken:
         self.boxes: list[Box] = [(one.x, one.y, one.x + one.width, one.y + one.height) for one in things]
         self.boxes += [(tag.x, tag.y, tag.x + tag.width, tag.y + tag.height) for tag in tags]
         self.links = links
+        self.said: set[tuple[int, str]] = set()
 
     def _is_free(self, box: Box, link: Link) -> bool:
         left, top, right, bottom = box
@@ -249,8 +250,16 @@ class _Taken:
         return None
 
     def text(self, link: Link, says: str) -> Point | None:
-        """Find a place for a text, above or next to a part of its line."""
-        width = width_of(shortened(says, LONGEST_SAID), PORT)
+        """Find a place for a text next to its line, unless another line from the same node says it already."""
+        if (id(link.tail), says) in self.said:
+            return None
+        found = self._beside(link, width_of(shortened(says, LONGEST_SAID), PORT))
+        if found is not None and link.tail is not None:
+            self.said.add((id(link.tail), says))
+        return found
+
+    def _beside(self, link: Link, width: float) -> Point | None:
+        """Find a place for a text above or next to a part of a line."""
         if link.tail is not None and link.tail_spots[0].outside:  # there is room for it below its port
             x, y = link.points[0]
             if (x + 6, y + 4, x + 6 + width, y + 15) in self.boxes:

@@ -8,6 +8,7 @@ shown: "perception" feeds everything, but its node "cube" says what for.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Final
 
 from msgspec.structs import replace
 
@@ -54,6 +55,7 @@ def to_overview(work: Work) -> None:
     pairs: dict[tuple[object, ...], Link] = {}
     for thing in work.things:
         thing.spots.clear()
+        thing.least = _LEAST
     for link in work.links:
         if not link.is_active and not _feeds(link):
             continue
@@ -74,6 +76,9 @@ def to_overview(work: Work) -> None:
     work.things = [one for one in work.things if id(one) in used or one.shape.is_state]
     for number, thing in enumerate(work.things):
         thing.number = number
+
+
+_LEAST: Final = 136.0  # so that a page can say where inside activity is
 
 
 def _feeds(link: Link) -> bool:

@@ -59,6 +59,7 @@ class Thing(msgspec.Struct, eq=False):
       left: how much room tags need next to it; also right, top and bottom.
       lane: its column, row: its uppermost row, span: how many rows.
       spine: how far from its left that line runs which leads straight down through the states.
+      least: how wide it is at least.
     """
 
     number: int
@@ -77,6 +78,7 @@ class Thing(msgspec.Struct, eq=False):
     spine: float = 0.0
     x: float = 0.0
     y: float = 0.0
+    least: float = 96.0
 
     def on(self, side: Side) -> list[Spot]:
         """Return the spots of a side, in order."""
