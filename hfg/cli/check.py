@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from hfg.analysis.report import MAX_STATES, analyse_activity
+from hfg.analysis.report import MAX_STATES, ActivityReport, analyse_activity
 from hfg.cli import show
 from hfg.cli.options import AllowOption, ArgOption, TargetArgument
 from hfg.cli.target import load_graph
-from hfg.errors import SEVERITIES, CheckFailed, FileError, HfgError, MachineError, Problem, TargetError
+from hfg.errors import CheckFailed, FileError, HfgError, MachineError, Problem, TargetError
 from hfg.graph import Graph
 from hfg.graph.structure.refusals import keep_refusals, problem_of
 from hfg.parts.model.costs import costs_of_deaths
@@ -29,54 +29,97 @@ def check(
         bool, typer.Option("--activity", help="Also prove what may be active together, and show how activity moves.")
     ] = False,
     states: Annotated[
-        int, typer.Option("--states", min=1, help="How many states of a part of the graph --activity looks at.")
-    ] = MAX_STATES,
+        int | None,
+        typer.Option(
+            "--states", min=1, help=f"How many states of a part of the graph --activity looks at ({MAX_STATES:,})."
+        ),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the problems as JSON.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
     """Check a graph for errors without running it (exit code 1 if there are any)."""
     show.set_debug(debug)
-    graph: Graph | None = None
-    refused_file: FileError | None = None
-    with keep_refusals() as problems:
+    if states is not None and not activity:
+        raise TargetError(f"--states {states} bounds what --activity looks at, and --activity is not given; add it")
+    found = _Findings(target)
+    with keep_refusals() as found.problems:
+        graph = found.load(arg or [], allow)
+    if graph is not None:
+        found.look_at(graph, MAX_STATES if states is None else states, activity=activity)
+    if json:
+        show.json(found.as_data(activity=activity))
+    else:
+        for line in found.lines():
+            show.write(f"{line}\n")
+    if found.refused_file is not None:
+        show.wants(found.refused_file)
+    return 1 if found.count("error") else 0
+
+
+class _Findings:
+    """What is wrong with a graph, and what it shows about itself."""
+
+    def __init__(self, target: str) -> None:
+        self.problems: list[Problem] = []
+        self.refused_file: FileError | None = None
+        self._name = target
+        self._target = target
+        self._costs: Sequence[Problem] = ()
+        self._activity: ActivityReport | None = None
+
+    def load(self, arguments: Sequence[str], allow: Sequence[str] | None) -> Graph | None:
+        """Build the graph; nothing where its code or its file is refused.
+
+        Raises:
+            TargetError: there is no such target, so nothing was looked at.
+        """
         try:
-            graph = load_graph(target, arg or [], allow)
+            return load_graph(self._target, arguments, allow)
         except TargetError as error:
             if not isinstance(error.__cause__, Exception):
-                raise  # there is no such target: nothing was looked at
+                raise
             show.user_traceback(error.__cause__)
-            problems += _unbuilt(target, error, error.__cause__)
+            self.problems += _unbuilt(self._target, error, error.__cause__)
         except FileError as error:
-            problems += error.problems
-            refused_file = error
-    if graph is not None:
-        refused = {problem.path.rpartition(" -> ")[2] for problem in problems}  # consequences of the refusals
-        found = graph.check()
-        problems += [one for one in found if not (one.check == "unconnected-input" and one.path in refused)]
-    report = None
-    if activity and graph is not None and not any(problem.severity == "error" for problem in problems):
-        report = analyse_activity(graph, max_states=states)
-        problems += report.problems
-    counts = {severity: sum(problem.severity == severity for problem in problems) for severity in SEVERITIES}
-    costs = [] if graph is None or counts["error"] else list(costs_of_deaths(graph))
-    if json and activity:
-        show.json({"problems": problems + costs, "activity": None if report is None else report.as_data()})
-    elif json:
-        show.json(problems + costs)
-    else:
-        for cost in costs:
-            remedy = f"; {cost.remedy}" if cost.remedy else ""
-            show.write(f"{cost.path}: {cost.what} ({cost.why}){remedy}\n")
-        for problem in problems:
-            show.write(f"{problem} [{problem.check}]\n")
-        for line in [] if report is None else report.lines():
-            show.write(f"{line}\n")
-        name = target if graph is None else f'graph "{graph.name}"'
-        show.write(f"{name}: {_count(counts['error'], 'error')}, {_count(counts['warning'], 'warning')}")
-        show.write(f", {_count(counts['hint'], 'hint')}\n" if counts["hint"] else "\n")
-    if refused_file is not None:
-        show.wants(refused_file)
-    return 1 if counts["error"] else 0
+            self.problems += error.problems
+            self.refused_file = error
+        return None
+
+    def look_at(self, graph: Graph, states: int, *, activity: bool) -> None:
+        """Check a graph that could be built."""
+        self._name = f'graph "{graph.name}"'
+        refused = {problem.path.rpartition(" -> ")[2] for problem in self.problems}
+        self.problems += [  # an input stays unconnected as a consequence of a refusal
+            one for one in graph.check() if not (one.check == "unconnected-input" and one.path in refused)
+        ]
+        if activity and not self.count("error"):
+            self._activity = analyse_activity(graph, max_states=states)
+            self.problems += self._activity.problems
+        if not self.count("error"):
+            self._costs = list(costs_of_deaths(graph))
+
+    def count(self, severity: str) -> int:
+        """Return how many problems are as severe as that."""
+        return sum(problem.severity == severity for problem in self.problems)
+
+    def as_data(self, *, activity: bool) -> object:
+        """Return what `--json` writes."""
+        problems = [*self.problems, *self._costs]
+        if not activity:
+            return problems
+        return {"problems": problems, "activity": None if self._activity is None else self._activity.as_data()}
+
+    def lines(self) -> Iterator[str]:
+        """Return what a person reads."""
+        for cost in self._costs:
+            yield f"{cost.path}: {cost.what} ({cost.why})" + (f"; {cost.remedy}" if cost.remedy else "")
+        for problem in self.problems:
+            yield f"{problem} [{problem.check}]"
+        if self._activity is not None:
+            yield from self._activity.lines()
+        counts = [_count(self.count(severity), severity) for severity in ("error", "warning")]
+        hints = self.count("hint")
+        yield f"{self._name}: {', '.join(counts + ([_count(hints, 'hint')] if hints else []))}"
 
 
 def _unbuilt(target: str, error: TargetError, cause: Exception) -> Sequence[Problem]:

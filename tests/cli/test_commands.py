@@ -350,6 +350,13 @@ def test_check_activity_shows_the_steps_by_which_two_nodes_become_active(hfg: Co
     assert hfg("check", TARGET, "--activity").out.startswith("no edge of the graph is active, so no node ever is\n")
 
 
+def test_check_refuses_a_limit_of_states_that_nothing_would_use(hfg: Command) -> None:
+    refused = hfg("check", TARGET, "--states", "2")
+    assert refused.code == 2
+    assert "--states 2 bounds what --activity looks at, and --activity is not given; add it" in refused.err
+    assert not refused.out
+
+
 def test_check_tells_at_once_all_that_a_graph_refuses_and_what_else_is_wrong(hfg: Command) -> None:
     with Path("halves.py").open("a", encoding="utf-8") as file:
         file.write(
