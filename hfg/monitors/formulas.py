@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
-from hfg.errors import UsageError
+from hfg.errors import HfgError, UsageError
 
 __all__ = [
     "Active",
@@ -288,9 +288,10 @@ def _path(given: Any, what: str, expected: str) -> str:
 
 
 def _place(given: Any) -> Any:
+    """Return where a node is in its graph; None before it is added, and of what is not a node."""
     try:
-        return given.place
-    except Exception:
+        return getattr(given, "place", None)
+    except HfgError:
         return None
 
 

@@ -140,6 +140,11 @@ class Judge:
         self.verdict = Verdict.VIOLATED
         return True
 
+    def give_up(self) -> None:
+        """Its condition has raised: nothing more is judged, and what holds is not known."""
+        self.due = math.inf
+        self.verdict = Verdict.UNKNOWN
+
 
 class _Always(Judge):
     def __init__(self, what: Property) -> None:

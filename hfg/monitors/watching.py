@@ -194,9 +194,8 @@ class Monitors:
 
     def _break(self, one: _Watch, error: Exception) -> None:
         self.broken[one.name] = error
-        one.judge.verdict = Verdict.UNKNOWN
         _LOGGER.warning('monitor "%s" judges nothing more, because its condition raised %r', one.name, error)
-        one.close()
+        one.give_up()
 
 
 def _clock(epoch: float) -> Callable[[], float]:
@@ -300,12 +299,12 @@ class _Watch:
         if self.judge.pass_to(t):
             self._monitors._violated(self, t)
 
-    def close(self) -> None:
-        """Judge nothing more."""
+    def give_up(self) -> None:
+        """Judge nothing more, since a condition has raised."""
         for end in self.ends:
             end()
         self._inside.clear()
-        self.judge.due = math.inf
+        self.judge.give_up()
 
 
 def watch(run: Run, *, on_violation: OnViolation = "note", **properties: Property) -> Monitors:
