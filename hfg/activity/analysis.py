@@ -47,17 +47,9 @@ class ActivityAnalysis:
         self._spread()
         self.asks = self._find_asking()
 
-    def path(self, end: int) -> str:
-        """Return the path of a node or subgraph."""
-        return self.flat.nodes[end].path if end > ROOT else self.flat.scopes[scope_end(end)].path
-
-    def members(self, end: int) -> list[int]:
-        """Return the node itself, or the nodes in the subgraph."""
-        return [end] if end > ROOT else self.flat.scopes[scope_end(end)].members
-
     def may_be_active(self, end: int) -> bool:
         """Return whether a node or subgraph may become active. A subgraph is active while a node inside is (G2)."""
-        return any(self.active[member] for member in self.members(end))
+        return any(self.active[member] for member in self.flat.members(end))
 
     def may_carry(self, edge: FlatEdge) -> bool:
         """Return whether a token with +1 may ever leave over an active edge (A3, A4)."""
@@ -111,12 +103,10 @@ class ActivityAnalysis:
                 more = f" and {len(edges) - 1} more are" if len(edges) > 1 else " is"
                 asks.setdefault(end, []).append(f'"{edges[0].label}"{more} active')
         for gate in self.flat.gates:
-            asks.setdefault(gate.by, []).append(f'a gate lets "{self.path(gate.target)}" work only while it is active')
-        for index, item in (
-            *((node.index, node.options) for node in self.flat.nodes),
-            *((scope_end(scope.index), scope.options) for scope in self.flat.scopes),
-        ):
-            if item.active_for_s is not None:
+            target = self.flat.path(gate.target)
+            asks.setdefault(gate.by, []).append(f'a gate lets "{target}" work only while it is active')
+        for index, options in self.flat.options():
+            if options.active_for_s is not None:
                 asks.setdefault(index, []).append("it has active_for_s")
         for node in self.flat.nodes:
             if _does(node):
@@ -145,10 +135,7 @@ def _does(node: FlatNode) -> bool:
 
 
 def _has_time_limits(flat: FlatGraph) -> bool:
-    return any(
-        options.active_for_s is not None
-        for options in (*(node.options for node in flat.nodes), *(scope.options for scope in flat.scopes))
-    )
+    return any(options.active_for_s is not None for _, options in flat.options())
 
 
 def _never_active(found: ActivityAnalysis) -> Iterator[Problem]:
@@ -157,7 +144,7 @@ def _never_active(found: ActivityAnalysis) -> Iterator[Problem]:
     for first, *others in _clusters(found, lost):
         more = f", nor {_named(found, others)} behind it" if others else ""
         yield Problem(
-            path=found.path(first),
+            path=found.flat.path(first),
             severity="warning" if begins else "hint",
             what=f"nothing in the graph makes it active{more}",
             why=f"though {' and '.join(found.asks[first])}",
@@ -183,7 +170,7 @@ def _clusters(found: ActivityAnalysis, lost: list[int]) -> Iterator[list[int]]:
                 connect(source, target)
                 led_to.add(target)
     for end in lost:
-        for member in found.members(end):
+        for member in found.flat.members(end):
             connect(end, member)
     asking = set(lost)
     seen: set[int] = set()
@@ -297,7 +284,7 @@ def _unheard_limits(found: ActivityAnalysis) -> Iterator[Problem]:
         if options.active_for_s is None or end in heard or node.timeout._observers:
             continue
         yield Problem(
-            path=found.path(end),
+            path=found.flat.path(end),
             severity="warning",
             what=f"active_for_s={options.active_for_s:g} has no effect, for nothing is connected to its timeout",
             why="when the time is over the event timeout is triggered, and nothing else happens (rule A12)",
@@ -340,7 +327,7 @@ def _waits_for_leaving(found: ActivityAnalysis, edge: FlatEdge) -> bool:
 
 
 def _named(found: ActivityAnalysis, ends: list[int]) -> str:
-    paths = [f'"{found.path(end)}"' for end in ends]
+    paths = [f'"{found.flat.path(end)}"' for end in ends]
     if len(paths) > 4:
         paths = [*paths[:3], f"{len(paths) - 3} more"]
     return paths[0] if len(paths) == 1 else f"{', '.join(paths[:-1])} and {paths[-1]}"

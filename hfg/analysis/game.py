@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
 from hfg.analysis.reading import NOTHING, Bag, Handler, Sent, parts_of, read
@@ -23,7 +23,7 @@ from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.nodetypes.description import NodeType
 from hfg.ports.automatic import AUTOMATIC_EVENTS, sent_of
 
-__all__ = ["Game", "Kind", "Play", "Rule", "Unread"]
+__all__ = ["Game", "Kind", "Play", "Rule", "Unread", "singles"]
 
 Kind: TypeAlias = Literal["fires", "is called", "sends", "takes", "loses", "gets back", "is set", "times out"]
 
@@ -88,15 +88,15 @@ class Rule:
         return sum(count for _, count in self.gives)
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Bits:
-    """Where each place has its bits."""
+    """Where each place has its bits: of nodes, rights and -1 their numbers, of edges the bits themselves."""
 
-    node: dict[int, int] = field(default_factory=dict)
-    right: dict[int, int] = field(default_factory=dict)
-    one: list[int] = field(default_factory=list)
-    two: list[int] = field(default_factory=list)
-    minus: dict[int, int] = field(default_factory=dict)
+    node: dict[int, int]
+    one: list[int]
+    two: list[int]
+    right: dict[int, int]
+    minus: dict[int, int]
 
 
 class Game:
@@ -146,23 +146,11 @@ class Game:
         for number in sorted(self._away):
             target = self.edges[number].target.node
             if target > ROOT:
-                text = f'"{self.path(target)}" takes -1'
+                text = f'"{self.flat.path(target)}" takes -1'
                 self.rules.append(Rule(text, "takes", target, number, minus=True, keeps="inactive"))
         self.bits = self._number()
         for scope in flat.scopes:
             self._add_scope(scope.index)
-
-    # --- words
-
-    def path(self, end: int) -> str:
-        """The path of a node or subgraph."""
-        if end == ROOT:
-            return "graph"
-        return self.flat.nodes[end].path if end > ROOT else self.flat.scopes[scope_end(end)].path
-
-    def members(self, end: int) -> list[int]:
-        """The node itself, or the nodes in the subgraph."""
-        return [end] if end > ROOT else self.flat.scopes[scope_end(end)].members
 
     # --- making the rules
 
@@ -170,7 +158,7 @@ class Game:
         found: dict[int, tuple[int, ...]] = {}
         for gate in self.flat.gates:
             if gate.idle_rate_hz is None:
-                for member in self.members(gate.target):
+                for member in self.flat.members(gate.target):
                     found[member] = (*found.get(member, ()), gate.by)
         return found
 
@@ -179,7 +167,7 @@ class Game:
         shut: set[int] = set()
         for edge in self.flat.edges:
             if edge.target.kind == "slot" and edge.target.name == "disable" and edge.target.node != ROOT:
-                shut.update(self.members(edge.target.node))
+                shut.update(self.flat.members(edge.target.node))
         shut |= {node.index for node in self.flat.nodes if node.options.on_error == "disable"}
         shut |= {node.index for node in self.flat.nodes if not node.options.enabled}
         shut |= {one for scope in self.flat.scopes if not scope.options.enabled for one in scope.members}
@@ -231,7 +219,7 @@ class Game:
             self._given += len(gives)
             if self._given > _MOST_GIVEN:
                 raise GraphError(
-                    f'"{self.path(index)}" sends activity in too many ways to analyse them: let fewer of its active '
+                    f'"{self.flat.path(index)}" sends activity in too many ways to analyse: let fewer of its active '
                     "edges lead to nodes that can be disabled"
                 )
             yield Rule(
@@ -377,19 +365,20 @@ class Game:
     # --- places
 
     def _number(self) -> _Bits:
-        bits = _Bits()
         place = itertools.count()
-        bits.node = {index: next(place) for index in self.nodes}
-        for _ in self.edges:
-            bits.one.append(1 << next(place))
-            bits.two.append(1 << next(place))
-        bits.right = {index: next(place) for index in sorted(self._rights)}
-        bits.minus = {number: next(place) for number in sorted(self._away)}
-        return bits
+        node = {index: next(place) for index in self.nodes}
+        of_edges = [(1 << next(place), 1 << next(place)) for _ in self.edges]
+        return _Bits(
+            node,
+            one=[one for one, _ in of_edges],
+            two=[two for _, two in of_edges],
+            right={index: next(place) for index in sorted(self._rights)},
+            minus={number: next(place) for number in sorted(self._away)},
+        )
 
     def mask_of(self, end: int) -> int:
         """The bits of a node, or of a subgraph with the tokens inside (rule G2)."""
-        inside = set(self.members(end))
+        inside = set(self.flat.members(end))
         mask = sum(1 << self.bits.node[one] for one in inside if one in self.bits.node)
         if end < ROOT:
             for number, edge in enumerate(self.edges):
@@ -439,7 +428,7 @@ class Play:
         bits = game.bits
         self.mask = game.places_of(self.nodes)
         for number, edge in enumerate(game.edges):
-            sources = game.members(edge.source.node) if edge.source.node != ROOT else ()
+            sources = game.flat.members(edge.source.node) if edge.source.node != ROOT else ()
             if not self.nodes.isdisjoint(sources):
                 self.mask |= bits.one[number] | bits.two[number]  # also those that lead out of the graph
         self.first = 0
@@ -451,7 +440,7 @@ class Play:
         self._always: list[Rule] = []
         self.rules = self._choose()
         self._over = {
-            index: Rule(f'what "{game.path(index)}" was doing is over', "takes", index) for index in bits.right
+            index: Rule(f'what "{game.flat.path(index)}" was doing is over', "takes", index) for index in bits.right
         }
 
     def _choose(self) -> list[Rule]:
@@ -487,11 +476,8 @@ class Play:
     def _needs(self, rule: Rule) -> Iterator[tuple[int | None, bool]]:
         bits = self.game.bits
         if rule.clears:
-            mask = rule.needs & self.mask
-            while mask:
-                low = mask & -mask
+            for low in singles(rule.needs & self.mask):
                 yield low.bit_length() - 1, False
-                mask ^= low
         elif rule.take >= 0:
             yield bits.minus[rule.take] if rule.minus else bits.one[rule.take].bit_length() - 1, False
         elif rule.kind == "is set":
@@ -522,10 +508,7 @@ class Play:
         for rule in self._always:
             yield from self._apply(rule, state, "nobody")
         cleared: set[int] = set()
-        mask = state
-        while mask:
-            low = mask & -mask
-            mask ^= low
+        for low in singles(state):
             for rule, by_right in self._by_bit.get(low.bit_length() - 1, ()):
                 if rule.clears:
                     if id(rule) in cleared:
@@ -562,6 +545,14 @@ class Play:
                 after |= 1 << bits.minus[number]
             if after != state:
                 yield rule, after
+
+
+def singles(mask: int) -> Iterator[int]:
+    """Yield each bit of a mask as a number of its own, the lowest first."""
+    while mask:
+        low = mask & -mask
+        yield low
+        mask ^= low
 
 
 def _ends_itself(kind: NodeType) -> bool:

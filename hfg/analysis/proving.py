@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from hfg.analysis.game import Game, Kind, Play, Rule
-from hfg.analysis.searching import Searched, pairs_together, search
+from hfg.analysis.game import Game, Kind, Play
+from hfg.analysis.searching import Searched, pairs_together
 from hfg.graph.flat import ROOT
 
 __all__ = ["Claim", "Step", "Verdict", "regions_of", "steps_to", "verdict"]
@@ -85,7 +85,7 @@ def regions_of(game: Game) -> list[list[int]]:
     for edge in game.edges:
         ends = [edge.target.node] if edge.target.node > ROOT else []
         if edge.source.node != ROOT:
-            ends += [one for one in game.members(edge.source.node) if one in leader]
+            ends += [one for one in game.flat.members(edge.source.node) if one in leader]
         for one in ends[1:]:
             leader[find(one)] = find(ends[0])
     found: dict[int, list[int]] = {}
@@ -94,41 +94,40 @@ def regions_of(game: Game) -> list[list[int]]:
     return list(found.values())
 
 
-def verdict(play: Play, nodes: Iterable[int], claim: Claim, limit: int) -> Verdict:
+def verdict(play: Play, found: Searched, nodes: Iterable[int], claim: Claim) -> Verdict:
     """Decide a claim about nodes that take part in a play.
 
     A node counts if it is active, and so does each activity in transit to one of them.
+
+    Args:
+      play: the game among these nodes, and perhaps others.
+      found: its states, or the first ones.
+      nodes: whose activity is counted.
+      claim: how many of them there are.
     """
     game = play.game
     nodes = sorted(nodes)
-    paths = tuple(game.path(index) for index in nodes)
+    paths = tuple(game.flat.path(index) for index in nodes)
     whole = play.nodes.issubset(nodes)
     mask = play.mask if whole else game.places_of(nodes)
-    kept = claim == "at most one" or (whole and not any(map(_may_lose, play.rules)) and play.first != 0)
+    kept = claim == "at most one" or (whole and not any(rule.may_lose for rule in play.rules) and play.first != 0)
     if kept and _counts(play):
         return Verdict(claim, paths, True, "counting")
     if kept and play.first.bit_count() < 2 and not _any_pair(play, mask):
         return Verdict(claim, paths, True, "concurrency relation")
 
-    def is_broken(state: int) -> bool:
-        count = (state & mask).bit_count()
-        return count > 1 or (count == 0 and claim == "exactly one")
-
-    found = search(play, limit, is_broken)
+    least = 1 if claim == "exactly one" else 0
     states = len(found.reached)
-    if found.found is not None:
-        return Verdict(claim, paths, False, "search", states, tuple(steps_to(game, found, found.found)))
+    for number, state in enumerate(found.reached, 1):
+        if not least <= (state & mask).bit_count() <= 1:
+            return Verdict(claim, paths, False, "search", number, tuple(steps_to(game, found, state)))
     if found.is_complete:
         return Verdict(claim, paths, True, "search", states)
     why = (
-        f"the search ended at its limit of {limit} states, and none of them breaks it; a larger limit looks further "
+        f"the search ended at its limit of {states} states, and none of them breaks it; a larger limit looks further "
         "(max_states=, --states)"
     )
     return Verdict(claim, paths, None, "search", states, why=why)
-
-
-def _may_lose(rule: Rule) -> bool:
-    return rule.may_lose
 
 
 def _counts(play: Play) -> bool:
@@ -145,7 +144,7 @@ def steps_to(game: Game, found: Searched, state: int) -> Iterator[Step]:
     for rule, after in found.way_to(state):
         yield Step(
             text=rule.text,
-            path=game.path(rule.actor),
+            path=game.flat.path(rule.actor),
             takes=game.edges[rule.take].label if rule.take >= 0 else "",
             sends=rule.sent,
             kind=rule.kind,

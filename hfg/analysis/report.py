@@ -72,7 +72,6 @@ class ActivityReport:
         self._limit = max_states
         self._bytes = max_states * _BYTES_PER_STATE
         self._plays = [Play(game, nodes) for nodes in regions_of(game)]
-        self._limits: list[int] = []
         self._found = [self._searched(play) for play in self._plays]
         self._pairs: dict[int, dict[int, int]] = {}
         self.unread: list[Unread] = list(dict.fromkeys(game.unread))
@@ -91,8 +90,7 @@ class ActivityReport:
     def _searched(self, play: Play) -> Searched:
         """Search a region, within its share of the memory that is left."""
         size = _STATE_BYTES + play.mask.bit_length() // 8
-        self._limits.append(max(1, min(self._limit, self._bytes // size)))
-        found = search(play, self._limits[-1])
+        found = search(play, max(1, min(self._limit, self._bytes // size)))
         self._bytes -= size * len(found.reached)
         return found
 
@@ -179,7 +177,7 @@ class ActivityReport:
         index = self._index_of.get(path)
         if index is None:
             raise GraphError(f'there is no node or subgraph "{path}" in the graph: name one by its path')
-        return self._game.members(index)
+        return self._game.flat.members(index)
 
     def _verdict(self, nodes: Iterable[Node | str], claim: Claim) -> Verdict:
         chosen: set[int] = set()
@@ -191,14 +189,15 @@ class ActivityReport:
             chosen.update(touched)
         if not chosen:
             raise UsageError(f"name the nodes of which {claim} is active, as in {claim.replace(' ', '_')}(wait, work)")
-        plays = [play for play in self._plays if not play.nodes.isdisjoint(chosen)]
-        play = plays[0] if len(plays) == 1 else Play(self._game, frozenset().union(*(one.nodes for one in plays)))
-        return verdict(play, chosen, claim, self._limit)
+        numbers = [number for number, play in enumerate(self._plays) if not play.nodes.isdisjoint(chosen)]
+        if len(numbers) == 1:
+            return verdict(self._plays[numbers[0]], self._found[numbers[0]], chosen, claim)
+        play = Play(self._game, frozenset().union(*(self._plays[number].nodes for number in numbers)))
+        return verdict(play, search(play, self._limit), chosen, claim)
 
     def _region(self, number: int) -> Region:
         play, found = self._plays[number], self._found[number]
-        at_most = verdict(play, play.nodes, "at most one", self._limits[number])
-        exactly = verdict(play, play.nodes, "exactly one", self._limits[number])
+        at_most, exactly = (verdict(play, found, play.nodes, claim) for claim in ("at most one", "exactly one"))
         unproved = ""
         if not found.is_complete:
             unproved = (
@@ -206,7 +205,7 @@ class ActivityReport:
                 "activity can be lost, is not known; a larger limit looks further (max_states=, --states)"
             )
         return Region(
-            nodes=tuple(self._game.path(index) for index in sorted(play.nodes)),
+            nodes=tuple(self._game.flat.path(index) for index in sorted(play.nodes)),
             begins=sum(1 for one in self._game.start if self._game.bits.one[one] & play.mask),
             at_most_one=at_most,
             exactly_one=exactly,
@@ -260,7 +259,7 @@ class ActivityReport:
                 more = f", nor do {len(never) - 1} more behind it" if len(never) > 1 else ""
                 problems.append(
                     Problem(
-                        path=game.path(never[0]),
+                        path=game.flat.path(never[0]),
                         severity="warning",
                         what=f"it is never active{more}",
                         why="activity never comes by any of the active edges that lead to it",
@@ -311,18 +310,15 @@ class ActivityReport:
         limited: set[int] = set()
         for rule in game.rules:
             if rule.kind == "times out" and rule.gives:
-                limited.update(game.members(rule.actor))
-        return [game.path(index) for index in game.nodes if index not in limited and self._may_be_active(index)]
+                limited.update(game.flat.members(rule.actor))
+        return [game.flat.path(index) for index in game.nodes if index not in limited and self._may_be_active(index)]
 
     def _kept_by_time_out(self) -> list[Problem]:
         """Time limits whose end is heard, but takes no activity along, where other events do."""
         flat, problems = self._game.flat, []
-        for end, options in (
-            *((node.index, node.options) for node in flat.nodes),
-            *((scope_end(scope.index), scope.options) for scope in flat.scopes),
-        ):
+        for end, options in flat.options():
             edges = [edge for edge in flat.edges if edge.source.node == end and edge.source.name == "timeout"]
-            inside = set(self._game.members(end))
+            inside = set(self._game.flat.members(end))
             leads_on = any(
                 edge.source.node in inside and edge.target.node not in inside and edge.source.node != end
                 for edge in self._game.edges
@@ -348,7 +344,7 @@ class ActivityReport:
         for edge in flat.edges:
             if edge.active or not active[edge.target.node, edge.target.name] or edge.target.node <= ROOT:
                 continue
-            members = game.members(edge.source.node) if edge.source.node != ROOT else []
+            members = game.flat.members(edge.source.node) if edge.source.node != ROOT else []
             if edge.source.name != "deactivated" and any(index in game.bits.node for index in members):
                 problems.append(
                     Problem(
@@ -379,7 +375,7 @@ class ActivityReport:
             if len(others) == 1:
                 problems.append(
                     Problem(
-                        path=f"{game.path(others[0])}.{event}",
+                        path=f"{game.flat.path(others[0])}.{event}",
                         severity="hint",
                         what="no active edge begins here, although one does at all other nodes of this type",
                         why=f"{kind.name} keeps its activity when it sends {event} (rule A5)",
@@ -392,7 +388,7 @@ class ActivityReport:
     def _ungated(self) -> list[Problem]:
         """Nodes without a gate whose outputs go where only gated ones send as well."""
         flat, game = self._game.flat, self._game
-        gated = {member for gate in flat.gates for member in game.members(gate.target)}
+        gated = {member for gate in flat.gates for member in game.flat.members(gate.target)}
         into: dict[tuple[int, str], list[int]] = {}
         for edge in flat.edges:
             if edge.source.kind == "output" and edge.source.node > ROOT:
@@ -405,7 +401,7 @@ class ActivityReport:
                 found[without[0]] = len(sources) - 1
         return [
             Problem(
-                path=game.path(index),
+                path=game.flat.path(index),
                 severity="hint",
                 what="it also sends when it is inactive",
                 why=f"the {others} other nodes that send to the same port work only while a gate is open (rule A11)",

@@ -6,10 +6,9 @@ concurrency relation (Kovalyov 1992) is polynomial, and finds at least every pai
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-from hfg.analysis.game import Play, Rule
+from hfg.analysis.game import Play, Rule, singles
 
 __all__ = ["Searched", "pairs_together", "search"]
 
@@ -21,12 +20,10 @@ class Searched:
     Attributes:
       reached: in the order in which they were found.
       is_complete: nothing was left out.
-      found: the first state that was looked for, if any.
     """
 
     reached: dict[int, tuple[int, Rule] | None]
     is_complete: bool
-    found: int | None
 
     def way_to(self, state: int) -> list[tuple[Rule, int]]:
         """Return the steps from the start to a state, and the state after each."""
@@ -39,20 +36,18 @@ class Searched:
         return way[::-1]
 
 
-def search(play: Play, limit: int, wanted: Callable[[int], bool] | None = None) -> Searched:
-    """Search breadth first, until a wanted state is found, nothing is left, or there are more states than the limit."""
+def search(play: Play, limit: int) -> Searched:
+    """Search breadth first, until nothing is left, or there are more states than the limit."""
     reached: dict[int, tuple[int, Rule] | None] = {play.first: None}
     waiting = [play.first]
     for state in waiting:
-        if wanted is not None and wanted(state):
-            return Searched(reached, False, state)
         for rule, after in play.steps_from(state):
             if after not in reached:
                 if len(reached) >= limit:
-                    return Searched(reached, False, None)
+                    return Searched(reached, False)
                 reached[after] = (state, rule)
                 waiting.append(after)
-    return Searched(reached, True, None)
+    return Searched(reached, True)
 
 
 def pairs_together(play: Play) -> dict[int, int]:
@@ -74,11 +69,7 @@ def pairs_together(play: Play) -> dict[int, int]:
         if rule.kind == "is set":
             free += [[me]] if rule.keeps == "active" else []
         elif rule.clears:
-            mask = rule.needs & play.mask & _first_bits(play)
-            while mask:
-                low = mask & -mask
-                mask ^= low
-                steps.append((low, given))
+            steps += [(low, given) for low in singles(rule.needs & play.mask & _first_bits(play))]
         elif rule.take >= 0:
             steps.append((bits.one[rule.take], given or ([me] if rule.keeps == "active" else [])))
         else:
@@ -110,9 +101,7 @@ def _closed(play: Play, steps: list[tuple[int, list[int]]], free: list[list[int]
             if new & ~together[place]:
                 together[place] |= new
                 changed = True
-                while new:
-                    low = new & -new
-                    new ^= low
+                for low in singles(new):
                     together[low] = together.get(low, 0) | place
 
     bits = play.game.bits

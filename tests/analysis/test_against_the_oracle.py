@@ -22,7 +22,7 @@ def compare(drawn: Drawn) -> str:
     found = search(play, MOST_STATES)
     states = explored.states()
     places = dict(zip([edge.label for edge in game.edges], game.bits.one, strict=True))
-    places |= {game.path(index): 1 << bit for index, bit in game.bits.node.items()}
+    places |= {game.flat.path(index): 1 << bit for index, bit in game.bits.node.items()}
     pairs = pairs_together(play)
     for active, lying in states:
         marked = [places[path] for path in active if path in places] + [places[label] for label, _ in lying]

@@ -264,9 +264,10 @@ def test_the_search_agrees_with_counting_about_the_mission() -> None:
     """Two methods that share little are right or wrong together rarely."""
     game = Game(flatten(build()))
     play = Play(game, game.nodes)
-    counted = verdict(play, play.nodes, "exactly one", 10_000)
-    some = [index for index in play.nodes if not game.path(index).endswith("approach")]
-    searched = verdict(play, some, "at most one", 10_000)
+    found = search(play, 10_000)
+    counted = verdict(play, found, play.nodes, "exactly one")
+    some = [index for index in play.nodes if not game.flat.path(index).endswith("approach")]
+    searched = verdict(play, found, some, "at most one")
     assert counted.method == "counting"
     assert searched.holds
 

@@ -142,6 +142,21 @@ class FlatGraph(msgspec.Struct, eq=False):
         """The level of its graph."""
         return level_of(self.graph)
 
+    def path(self, end: int) -> str:
+        """Return the path of what is named as in `End.node`: a node, a dissolved subgraph, or the graph itself."""
+        if end == ROOT:
+            return "graph"
+        return self.nodes[end].path if end > ROOT else self.scopes[scope_end(end)].path
+
+    def members(self, end: int) -> list[int]:
+        """Return the node itself, or the nodes in the subgraph."""
+        return [end] if end > ROOT else self.scopes[scope_end(end)].members
+
+    def options(self) -> Iterator[tuple[int, NodeOptions]]:
+        """Yield the options of each node and dissolved subgraph, with its name as in `End.node`."""
+        yield from ((node.index, node.options) for node in self.nodes)
+        yield from ((scope_end(scope.index), scope.options) for scope in self.scopes)
+
     def walk(self) -> Iterator[FlatGraph]:
         """Yield this graph and all that iterate inside it."""
         waiting = [self]
