@@ -1,4 +1,4 @@
-"""`hfg new node|graph|plugin NAME`: begins a file and its test, or a package. Depends on `templates`."""
+"""`hfg new node|graph|plugin NAME`: begins a file and its test, or a package, from the texts in `templates/`."""
 
 from __future__ import annotations
 
@@ -6,22 +6,29 @@ import keyword
 import re
 import sys
 from collections.abc import Mapping
+from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
-from hfg.cli import show, templates
+from hfg.cli import show
 from hfg.errors import TargetError
-
-__all__ = ["new", "verbs"]
 
 verbs = typer.Typer()
 
 Name = Annotated[str, typer.Argument(help="as in map_lookup, MapLookup or nodes/map_lookup.py")]
 
 _LONGEST_NAME = 40  # a longer one would make lines that formatters break
+_PLUGIN: Final = {
+    "pyproject.toml": "project",
+    "README.md": "readme",
+    "src/{module}/nodes.py": "nodes",
+    "tests/test_{module}.py": "test_of_nodes",
+}
+"""The files of a package with their templates."""
+_PLUGIN_EMPTY: Final = {"src/{module}/__init__.py": '"""Node types for hfg."""\n', "src/{module}/py.typed": ""}
 
 
 @verbs.callback()
@@ -32,13 +39,13 @@ def new() -> None:
 @verbs.command("node")
 def _node(name: Name) -> int:
     """Write a node type with ports of all kinds, and its test."""
-    return _write(name, templates.NODE, templates.NODE_TEST, "")
+    return _write(name, "node", "")
 
 
 @verbs.command("graph")
 def _graph(name: Name) -> int:
     """Write a graph of three nodes, and its test."""
-    return _write(name, templates.GRAPH, templates.GRAPH_TEST, "run")
+    return _write(name, "graph", "run")
 
 
 @verbs.command("plugin")
@@ -53,8 +60,8 @@ def _plugin(
     if folder.is_symlink() or folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise TargetError(f"{folder} is there already and not empty: hfg new overwrites nothing; take another name")
     words = _words(module) | {"distribution": folder.name}
-    files = {folder / place.format(**words): text for place, text in templates.PLUGIN.items()}
-    _write_all({file: text.format(**words) for file, text in files.items()})
+    texts = {place: _filled(template, words) for place, template in _PLUGIN.items()} | _PLUGIN_EMPTY
+    _write_all({folder / place.format(**words): text for place, text in texts.items()})
     show.write(f"{folder} is there; try pip install -e {folder}, then hfg nodes {words['Name']} and pytest {folder}\n")
     return 0
 
@@ -63,9 +70,14 @@ def _words(module: str) -> dict[str, str]:
     return {"module": module, "Name": "".join(word.capitalize() for word in module.split("_"))}
 
 
-def _write_all(files: Mapping[Path, str]) -> None:
+def _filled(template: str, words: Mapping[str, str]) -> str:
+    """Return the text of a template; braces of the text itself are doubled in it."""
+    return files("hfg.cli").joinpath("templates", f"{template}.txt").read_text("utf-8").format(**words)
+
+
+def _write_all(texts: Mapping[Path, str]) -> None:
     """Write files that are not there yet, with the folders they lie in."""
-    for file, text in files.items():
+    for file, text in texts.items():
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
             with file.open("x", encoding="utf-8") as stream:
@@ -74,14 +86,14 @@ def _write_all(files: Mapping[Path, str]) -> None:
             raise TargetError(f"{file} cannot be written: {error.strerror}") from None
 
 
-def _write(named: str, code: str, test: str, verb: str) -> int:
+def _write(named: str, template: str, verb: str) -> int:
     file = _file(named)
     tests = file.with_name(f"test_{file.name}")
     for one in (file, tests):
         if one.exists() or one.is_symlink():
             raise TargetError(f"{one} is there already: hfg new overwrites nothing; take another name")
     words = _words(file.stem)
-    _write_all({one: template.format(**words) for one, template in ((file, code), (tests, test))})
+    _write_all({file: _filled(template, words), tests: _filled(f"test_of_{template}", words)})
     next_step = f"hfg run {file}" if verb else f"hfg nodes {file}"
     show.write(f"{file} and {tests} are there; try {next_step} and pytest {tests}\n")
     return 0
