@@ -12,7 +12,7 @@ before OpenCV sees it, because some functions would end the process. A type is m
     _stub        functions, their arguments and constants, from the type stub
     _docs        what the docstrings say of them
     _overrides   kinds of arrays, defaults, limits, choices: what neither of them says
-    _words       categories, names of outputs, which functions are left out
+    _words       categories, names of outputs, which functions are left out: `words.toml`
     _recipes     makes recipes for node types of all that, and calls
 """
 

@@ -27,11 +27,9 @@ from hfg.nodes.cv._calling import Calling, Inlet, Knob
 from hfg.nodes.cv._docs import Documentation, read
 from hfg.nodes.cv._overrides import Say
 from hfg.nodes.cv._stub import Argument, Overload, overloads
-from hfg.nodes.cv._words import ABOUT, APEX, CATEGORIES, ENTRIES, NO_NODES, OUTPUTS, OVERLOADS, unit_of
+from hfg.nodes.cv._words import ABOUT, APEX, ARGUMENTS, CATEGORIES, NO_NODES, OUTPUTS, OVERLOADS, unit_of
 from hfg.ports.specs import REQUIRED
 from hfg.types import Array, Pixels, array_facts
-
-__all__ = ["Measured", "ResultKind", "chosen", "measured", "names", "recipe", "refused"]
 
 
 class ResultKind(msgspec.Struct, frozen=True):
@@ -226,7 +224,7 @@ def _about(name: str, told: Documentation) -> str:
 
 
 def _entry(function: str, name: str, told: Documentation) -> str:
-    text = ENTRIES.get((function, name)) or told.arguments.get(name) or f"{name} of OpenCV's function."
+    text = ARGUMENTS.get(function, {}).get(name) or told.arguments.get(name) or f"{name} of OpenCV's function."
     return text if text.endswith((".", "!", "?", "...")) else f"{text}."
 
 
