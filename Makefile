@@ -104,7 +104,7 @@ docs-drawings: $(READY)
 	HFG_REDRAW=1 $(BIN)/python -m pytest -q tests/test_drawings.py
 
 docs-nodes: $(READY)
-	$(BIN)/python -m hfg.catalogue.page docs/nodes
+	$(BIN)/python -m tools.write_node_pages docs/nodes
 
 # The built page is committed, so that nobody needs Node to use the studio. Scripts of packages are not run.
 web/node_modules: web/package.json web/package-lock.json

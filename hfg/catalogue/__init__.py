@@ -6,7 +6,6 @@
     finding         imports those places and lists their types; reports broken ones and continues
     searching       by words, by name, by category
     keeping         the index of installed types, in a file, so that a search imports nothing
-    page            docs/nodes, written from the catalogue
 
 Depends on node types, not on graphs, runs or the command line. Everything is imported on demand: `installed()` imports
 every place, `installed_index()` only if something has changed, and `hfg.registry.find` one module.

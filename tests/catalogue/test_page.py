@@ -8,16 +8,19 @@ from pathlib import Path
 
 import pytest
 
-from hfg.catalogue.page import DISTRIBUTIONS, made_with, main, pages
+from tools.write_node_pages import DISTRIBUTIONS, made_with, main, pages
 
-FOLDER = Path(__file__).resolve().parents[2] / "docs" / "nodes"
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = ROOT / "docs" / "nodes"
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Written by a process of its own: types that other tests have made or imported say more than a user sees."""
     folder = tmp_path_factory.mktemp("pages")
-    subprocess.run([sys.executable, "-m", "hfg.catalogue.page", str(folder)], check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, "-m", "tools.write_node_pages", str(folder)], check=True, capture_output=True, cwd=ROOT
+    )
     return {file.name: file.read_text(encoding="utf-8") for file in folder.glob("*.md")}
 
 

@@ -1,4 +1,4 @@
-"""docs/nodes, written from the library itself: `python -m hfg.catalogue.page [FOLDER]`, or `make docs-nodes`.
+"""docs/nodes, written from the library itself: `python -m tools.write_node_pages [FOLDER]`, or `make docs-nodes`.
 
 There is one page per family, with everything that the catalogue has about its types, and an index. A generated family
 with hundreds of types has a page of tables. The same library yields the same pages. Depends on the catalogue, not on
@@ -20,8 +20,6 @@ from hfg.catalogue.describing import ParameterDescription, PortDescription, Type
 from hfg.catalogue.finding import submodules, types_of
 from hfg.catalogue.offers import LIBRARY
 from hfg.catalogue.searching import categories
-
-__all__ = ["DISTRIBUTIONS", "made_with", "main", "pages"]
 
 _MOST_IN_WHOLE: Final = 150  # types of one family; larger families are shown as tables
 _NOTE: Final = "<!-- Written by `make docs-nodes` from the docstrings of the library: change those. -->"
