@@ -24,7 +24,7 @@ The tutorial is docs/tutorial.md. `import hfg` is fast, because each name is imp
 For developers: these are the layers of the package. Imports go down only. Layers 0 to 3 build graphs without an
 engine; code that waits starts in layer 5.
 
-    7  cli      studio    pubsub    composing
+    7  cli      studio    composing
     6  nodes    files   recording   reporting   parts   catalogue    also: testing (imports all; none imports it)
     5  engine   links.running                             outside: hfg_transports (imports layers 0-1 only)
     4  activity   analysis   links   timeline
@@ -56,10 +56,10 @@ if TYPE_CHECKING:
     from hfg.errors import EndOfStream, Failure
     from hfg.files import load, save
     from hfg.graph import Graph, Subgraph, commands, operator
+    from hfg.nodes.links import publish, subscribe
     from hfg.nodetypes.functions import node
     from hfg.nodetypes.node import Node
     from hfg.ports import Event, Events, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
-    from hfg.pubsub import publish, subscribe
     from hfg.registry import reference_of
 
 __all__ = [
@@ -125,7 +125,7 @@ if not TYPE_CHECKING:
             "nodetypes.functions": ("node",),
             "nodetypes.node": ("Node",),
             "ports": ("Event", "Events", "Input", "Inputs", "Output", "Outputs", "Parameter", "Slots", "State", "slot"),
-            "pubsub": ("publish", "subscribe"),
+            "nodes.links": ("publish", "subscribe"),
             "registry": ("reference_of",),
         },
     )

@@ -51,7 +51,6 @@ FLOORS = {
     "hfg.monitors": 6,
     "hfg.cli": 7,
     "hfg.studio": 7,
-    "hfg.pubsub": 7,
     "hfg.composing": 7,  # puts what stands high where lower floors ask for it
     "hfg.__main__": 8,  # the two doors: they may see everything, and nobody sees them
     "hfg": 8,
