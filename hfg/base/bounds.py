@@ -10,19 +10,6 @@ from __future__ import annotations
 import os
 from typing import Final, NamedTuple
 
-__all__ = [
-    "ACTIVE_EDGES",
-    "BOUNDS",
-    "CHUNK_BYTES",
-    "CHUNK_MESSAGES",
-    "FILE_BYTES",
-    "GRAPH_FILE_BYTES",
-    "JSON_VALUES",
-    "NODES_AND_PORTS",
-    "PICTURE_PIXELS",
-    "Bound",
-]
-
 
 class Bound(NamedTuple):
     """A limit.

@@ -15,8 +15,6 @@ from typing import Final
 
 from hfg.errors import NotRunning
 
-__all__ = ["current_clock", "current_elapsed", "elapsed", "now", "time_told_by"]
-
 current_clock: Final[ContextVar[Callable[[], float]]] = ContextVar("hfg.base.clock", default=time.time)
 """Set by the engine around the code of a run, on the loop and in threads."""
 

@@ -11,8 +11,6 @@ from typing import Any, Final, TypeVar, cast
 
 import msgspec
 
-__all__ = ["cleaned", "escaped", "is_terminal", "name_problem"]
-
 _CONTROLS: Final = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ud800-\udfff\U000e0000-\U000e007f]"
 )

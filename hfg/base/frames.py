@@ -10,8 +10,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
-__all__ = ["is_machinery", "is_ours", "is_standard", "users_part"]
-
 _OURS: Final = str(Path(__file__).resolve().parent.parent)
 _STANDARD: Final = str(Path(traceback.__file__).parent)
 _MACHINERY: Final = (

@@ -12,8 +12,6 @@ from typing import Any, Final
 
 from typing_extensions import get_protocol_members, is_protocol
 
-__all__ = ["UNKNOWN", "callable_parts", "class_of", "lacks", "parts_as", "tuple_items"]
-
 UNKNOWN: Final = None
 """The parts of a bare generic type: `list` may hold anything, so its values are checked instead."""
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-__all__ = ["hooks"]
-
 
 class _Hooks:
     """The functions by name; the ones they stand for are documented there.

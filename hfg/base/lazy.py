@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from typing import Any
 
-__all__ = ["on_demand"]
-
 
 def on_demand(package: str, names: Mapping[str, Iterable[str]]) -> Callable[[str], Any]:
     """Return a `__getattr__` for a package: it imports names from their modules, and submodules by their names.

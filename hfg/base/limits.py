@@ -18,8 +18,6 @@ import numpy as np
 
 from hfg.types import Named, Shape, accepts
 
-__all__ = ["LIMITS", "Inside", "breaks", "kept_metadata", "limits_of", "limits_within", "numbers_within", "step_within"]
-
 
 class Inside(msgspec.Struct, frozen=True, repr_omit_defaults=True):
     """Limits of a type's parts, as in `list[Annotated[float, Ge(0)]]`."""

@@ -16,8 +16,6 @@ from typing import Any, Final, TypeAlias
 
 from hfg.errors import in_words
 
-__all__ = ["Log", "Logger", "current_log", "log", "node_log"]
-
 Logger: TypeAlias = logging.LoggerAdapter[logging.Logger]
 
 _NODES: Final = "hfg.node"

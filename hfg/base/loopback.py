@@ -13,8 +13,6 @@ from typing_extensions import override
 
 from hfg.base.logs import log
 
-__all__ = ["OwnListener", "PeerUsers"]
-
 _HEAD: Final = struct.Struct("=IHHII")  # of a netlink message: size, kind, flags, number, port
 _FOUND, _ASKS = 20, 1  # SOCK_DIAG_BY_FAMILY, NLM_F_REQUEST
 _WHAT: Final = struct.Struct("=BBBBI")  # family, protocol, extensions, padding, states

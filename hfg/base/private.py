@@ -20,20 +20,6 @@ if sys.platform != "win32":
     import grp
     import pwd
 
-__all__ = [
-    "MACHINE",
-    "Connected",
-    "check_parents",
-    "check_private",
-    "exposure_of_key",
-    "is_of_this_user",
-    "may_be_changed",
-    "open_private",
-    "require_peer_credentials",
-    "state_folder",
-    "way_to",
-]
-
 _PEER: Final = struct.Struct("3i")  # process, user and group of who is at the other end
 _OTHERS: Final = 0o077
 _MOST_LINKS: Final = 40  # that Linux follows on one way

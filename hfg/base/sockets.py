@@ -17,8 +17,6 @@ from typing import Final
 from hfg.base.private import MEETING, is_of_this_user, open_private, require_peer_credentials
 from hfg.errors import TransportError
 
-__all__ = ["SOCKET_FILE", "SocketFolder"]
-
 SOCKET_FILE: Final = re.compile(r"([0-9a-f-]+)\.(sock|new)")
 """Names of the files of sockets; one that is not listening yet is a ".new"."""
 

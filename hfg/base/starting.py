@@ -12,8 +12,6 @@ import sys
 import threading
 from pathlib import PurePath
 
-__all__ = ["is_command", "let_go_at_once"]
-
 
 def is_command() -> bool:
     """Return whether this process is the command: the script `hfg`, or `python -m hfg`."""

@@ -6,8 +6,6 @@ import types
 from collections.abc import Callable, Coroutine, Generator
 from typing import Any, TypeVar
 
-__all__ = ["measured_steps"]
-
 T = TypeVar("T")
 
 

@@ -10,8 +10,6 @@ from typing import Final, Generic, TypeVar
 
 import msgspec
 
-__all__ = ["END", "NO_MESSAGE", "Marker", "Token"]
-
 T_co = TypeVar("T_co", covariant=True)
 
 

@@ -14,8 +14,6 @@ from typing import Any, Final, Generic, NamedTuple, TypeVar
 import msgspec
 import numpy as np
 
-__all__ = ["Colour", "Span", "own_copy", "same"]
-
 T = TypeVar("T")
 
 _HEX: Final = re.compile(r"#([0-9a-fA-F]{6}|[0-9a-fA-F]{3})")

@@ -16,8 +16,6 @@ from typing import Any, BinaryIO, Final, Literal
 
 from hfg.base.private import way_to
 
-__all__ = ["GrowingFile", "create", "need_trusted", "need_writable", "read_plain", "write_in_place", "write_whole"]
-
 _HELD_BYTES: Final = 64 * 1024
 _PERMISSIONS: Final = 0o777  # never those by which a file runs as its owner
 _SHARED: Final = stat.S_ISVTX | stat.S_IWOTH  # of a folder in which all may write, and none removes another's files

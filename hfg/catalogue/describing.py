@@ -21,17 +21,6 @@ from hfg.nodetypes.node import Node
 from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.types import Widget, describe
 
-__all__ = [
-    "ErrorDescription",
-    "ParameterDescription",
-    "PortDescription",
-    "TypeDescription",
-    "describe_parameter",
-    "describe_type",
-    "undocumented",
-]
-
-
 _LIMITS: Final = {
     "gt": "> {}",
     "ge": ">= {}",

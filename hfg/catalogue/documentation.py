@@ -15,8 +15,6 @@ from typing import Final
 from docstring_parser import DocstringParam, DocstringRaises, DocstringReturns, ParseError
 from docstring_parser.google import GoogleParser
 
-__all__ = ["Documentation", "read_documentation"]
-
 _OWN_LINES: Final = re.compile(r"^(CS::APEX|Category):[ ]*(.*(?:\n(?!\s*$)(?!CS::APEX:|Category:).*)*)", re.MULTILINE)
 _APEX_NAME: Final = re.compile(r"[A-Za-z_]\w*(?:::\w+)+")
 _ENTRY: Final = re.compile(r"^(\w+):\s+(.*)$")

@@ -25,8 +25,6 @@ from hfg.nodetypes.description import NodeType
 from hfg.nodetypes.functions import FunctionNode, NodeFunction
 from hfg.nodetypes.node import Node
 
-__all__ = ["Catalogue", "installed", "submodules", "types_of"]
-
 _BASES: Final = (Node, Subgraph, FunctionNode)
 _TESTS: Final = ("test", "tests", "conftest")
 

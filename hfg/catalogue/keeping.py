@@ -26,8 +26,6 @@ import msgspec
 from hfg.catalogue.offers import Offer, offers
 from hfg.catalogue.searching import Index, index_of
 
-__all__ = ["Kept", "installed_index"]
-
 _FORMAT: Final = "1"
 _INSTALLED: Final = (".dist-info", ".egg-info", ".egg-link", ".pth")
 _WRITTEN_BY_OTHERS: Final = stat.S_IWGRP | stat.S_IWOTH

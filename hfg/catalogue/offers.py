@@ -12,8 +12,6 @@ from typing import Final
 
 import msgspec
 
-__all__ = ["LIBRARY", "Offer", "offers"]
-
 LIBRARY: Final = "hfg.nodes"
 """The package of the standard library, and the group name of the entry points."""
 

@@ -21,8 +21,6 @@ import msgspec
 if TYPE_CHECKING:  # a search of the stored index needs no description
     from hfg.catalogue.describing import TypeDescription
 
-__all__ = ["Entry", "Index", "categories", "index_of", "named", "near_words", "ranked", "search", "unmatched"]
-
 _STEMMING: Final = threading.Lock()
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_a-zA-Z]+")
 _IDLE_WORDS: Final = (

@@ -25,8 +25,6 @@ from hfg.parts.hosts.hosting import Journal, ThisComputer, logs_folder
 from hfg.parts.running.rings import sweep_runs
 from hfg.parts.transports import open_session
 
-__all__ = ["agent", "session_settings"]
-
 _ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 

@@ -21,8 +21,6 @@ from hfg.cli.interrupt import Interrupt
 from hfg.cli.verbs import Verbs
 from hfg.errors import FileError, HfgError, TargetError
 
-__all__ = ["app", "main"]
-
 app = typer.Typer(
     name="hfg",
     cls=Verbs,

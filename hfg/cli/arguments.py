@@ -14,8 +14,6 @@ from hfg.encoding import read_text
 from hfg.errors import EncodingError, TargetError
 from hfg.types import accepts, describe
 
-__all__ = ["builder_arguments"]
-
 _PLAIN = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 

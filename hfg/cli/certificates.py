@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from cryptography import x509
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
 
-__all__ = ["AUTHORITY", "Kind", "make_authority", "make_certificate"]
-
 AUTHORITY: Final = "authority"
 """The file name of what signs all others."""
 

@@ -18,8 +18,6 @@ from hfg.graph import Graph
 from hfg.graph.structure.refusals import keep_refusals, problem_of
 from hfg.parts.model.costs import costs_of_deaths
 
-__all__ = ["check"]
-
 
 def check(
     target: TargetArgument,

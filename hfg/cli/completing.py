@@ -24,8 +24,6 @@ from hfg.cli.target import load_graph
 from hfg.graph import Graph, Subgraph
 from hfg.nodetypes.node import Node
 
-__all__ = ["parameters", "ports", "targets"]
-
 _PLAIN: Final = re.compile(r"[\w./:=,@%+][\w./:=,@%+~\[\]-]*")
 
 

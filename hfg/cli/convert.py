@@ -18,8 +18,6 @@ from hfg.cli.target import SUFFIXES, import_from_here, load_graph
 from hfg.errors import TargetError, UsageError
 from hfg.files import apex, describe, save, schema, text_of, write
 
-__all__ = ["convert"]
-
 
 def convert(
     target: Annotated[

@@ -19,8 +19,6 @@ from hfg.cli.app import main as command
 from hfg.parts.hosts.hosting import Deployed
 from hfg.parts.hosts.remote_parts import deployed_as
 
-__all__ = ["main"]
-
 _LONGEST: Final = 2**20
 _PATIENCE_S: Final = 10.0
 

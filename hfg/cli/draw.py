@@ -12,8 +12,6 @@ from hfg.cli.options import AllowOption, ArgOption, TargetArgument
 from hfg.cli.target import load_graph
 from hfg.errors import GraphError, UsageError
 
-__all__ = ["draw"]
-
 
 def draw(
     target: TargetArgument,

@@ -19,8 +19,6 @@ from hfg.errors import HfgError, TargetError, UsageError
 from hfg.graph import Graph
 from hfg.parts.processes.rendezvous import Rendezvous
 
-__all__ = ["GraphRun"]
-
 
 class GraphRun:
     """A graph that a verb runs.

@@ -12,8 +12,6 @@ from hfg.engine.observing.tables import table
 from hfg.errors import TargetError, UsageError
 from hfg.recording import File, Loss, RecordingInfo
 
-__all__ = ["info", "told_losses"]
-
 
 def info(
     file: Annotated[Path, typer.Argument(help="a recording, or any MCAP file")],

@@ -27,8 +27,6 @@ from typing import Any, ClassVar, Final
 
 from hfg.base.controls import escaped
 
-__all__ = ["Interrupt"]
-
 _ALIKE = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 _BREAK_IN_AFTER_S = 0.6
 _LEAVE_AFTER_S = 1.8

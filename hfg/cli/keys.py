@@ -14,8 +14,6 @@ from hfg.cli import show
 from hfg.cli.certificates import AUTHORITY, Kind, make_authority, make_certificate
 from hfg.errors import TargetError
 
-__all__ = ["keys", "verbs"]
-
 verbs = typer.Typer()
 
 _NEXT = """{folder} holds authority, agent, worker and viewer, each with a .pem and a .key. Settings of an agent say:

@@ -15,8 +15,6 @@ from hfg.cli.table import View
 from hfg.cli.terminal import Foot, is_terminal
 from hfg.engine import Run
 
-__all__ = ["EVERY_S", "Live", "live_table"]
-
 EVERY_S: Final = 0.25
 
 

@@ -24,8 +24,6 @@ from hfg.errors import TargetError
 if TYPE_CHECKING:
     from hfg.catalogue import Catalogue, Entry, Index, ParameterDescription, TypeDescription
 
-__all__ = ["nodes"]
-
 Listed = TypeVar("Listed", "Entry", "TypeDescription")
 
 _LIBRARY = "hfg.nodes"

@@ -14,22 +14,6 @@ from hfg.cli import completing
 from hfg.engine.runtime.settings import RunFields
 from hfg.graph.structure.option import declared
 
-__all__ = [
-    "AllowOption",
-    "ArgOption",
-    "Clock",
-    "ClockOption",
-    "DebugOption",
-    "ForceOption",
-    "ParamOption",
-    "SettingsOption",
-    "TableOption",
-    "TargetArgument",
-    "UntilOption",
-    "VerboseOption",
-    "with_run_options",
-]
-
 
 class Clock(StrEnum):
     """The clocks a run can have."""

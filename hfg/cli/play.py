@@ -28,8 +28,6 @@ from hfg.graph import Graph
 from hfg.recording import Playing, Recording, play_into
 from hfg.recording import record as begin_recording
 
-__all__ = ["play"]
-
 
 def play(
     file: Annotated[Path, typer.Argument(help="a recording, as hfg record writes it")],

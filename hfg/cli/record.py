@@ -28,8 +28,6 @@ from hfg.engine import Run
 from hfg.recording import Recording
 from hfg.recording import record as begin_recording
 
-__all__ = ["record", "told"]
-
 
 class _Images(StrEnum):
     raw = "raw"

@@ -13,8 +13,6 @@ from hfg.cli.options import ForceOption
 from hfg.errors import TargetError, UsageError
 from hfg.recording import recover as recover_recording
 
-__all__ = ["recover"]
-
 
 def recover(
     file: Annotated[Path, typer.Argument(help="a recording, or any MCAP file")],

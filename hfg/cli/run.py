@@ -36,8 +36,6 @@ from hfg.errors import TargetError
 from hfg.timeline import Timeline
 from hfg.trace import TraceEvent
 
-__all__ = ["run"]
-
 _TRACES: Final = ("", ".jsonl", ".json")
 
 

@@ -28,8 +28,6 @@ from hfg.parts.hosts.realm import FINDS_S, AgentIs, Realm, RunIs, agent_place, r
 from hfg.parts.hosts.requests import Request, ask
 from hfg.parts.transports import open_session
 
-__all__ = ["RealmLine", "deploy", "logs", "ps", "restart", "stop"]
-
 _SETTLES_S: Final = 0.3  # how long presences take to arrive after the first one
 _LOOKS_AGAIN_S: Final = 0.5
 _BEGINS_S: Final = 60.0

@@ -13,8 +13,6 @@ from hfg.errors import EncodingError, GraphError, TargetError
 from hfg.graph import Graph
 from hfg.ports import ParameterPort
 
-__all__ = ["set_parameters"]
-
 
 def set_parameters(graph: Graph, settings: Iterable[str]) -> None:
     """Set parameters of a graph's nodes before it runs.

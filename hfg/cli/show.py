@@ -24,21 +24,6 @@ if TYPE_CHECKING:
     from hfg.engine.fusion.explaining import Explanation
     from hfg.engine.observing.report import Report
 
-__all__ = [
-    "Records",
-    "explanations",
-    "failure",
-    "json",
-    "report",
-    "sentence",
-    "set_arguments",
-    "set_debug",
-    "table",
-    "user_traceback",
-    "wants",
-    "write",
-]
-
 _WIDTH_OF_A_FILE = 200
 _debug = False
 _arguments: Sequence[str] = ()

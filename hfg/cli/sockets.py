@@ -16,8 +16,6 @@ from hfg.engine.face.watching import Answer, Question, run_names, run_sockets
 from hfg.engine.observing.encoding import encode
 from hfg.errors import TargetError
 
-__all__ = ["Line", "find", "is_process", "runs", "which"]
-
 _LONGEST_ANSWER: Final = 64_000_000
 _PATIENCE_S: Final = 2.0
 

@@ -26,8 +26,6 @@ from hfg.engine.face.watching import Question
 from hfg.errors import TargetError
 from hfg.studio.local import FrameReader
 
-__all__ = ["edit", "pause", "redo", "reload", "resume", "set", "step", "trigger", "undo"]
-
 _PATIENCE: Final = 30
 """How often a request waits two seconds for the run to come to it: an edit waits for firings in progress."""
 

@@ -30,8 +30,6 @@ from hfg.graph.structure.paths import node_at
 from hfg.studio.project import Project, RecordedProject
 from hfg.studio.studio import Studio
 
-__all__ = ["studio"]
-
 
 def studio(
     target: Annotated[

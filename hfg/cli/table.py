@@ -17,8 +17,6 @@ from rich.cells import cell_len, set_cell_size
 
 from hfg.engine import Glance, NodeGlance
 
-__all__ = ["Row", "View"]
-
 _OVER_S: Final = 1.0
 _NARROWEST_PATH: Final = 10
 _FEWEST_ROWS: Final = 3  # before them the groups and who is active leave

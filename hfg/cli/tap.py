@@ -26,8 +26,6 @@ from hfg.engine.face.watching import Answer, Question
 from hfg.engine.observing.encoding import line_of
 from hfg.errors import GraphError, TargetError, UsageError
 
-__all__ = ["tap"]
-
 _CODE: Final = (".py", ".yaml", ".yml", *SUFFIXES)
 _KEPT = 10_000  # more than a graph sends between two turns of the loop
 

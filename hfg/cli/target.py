@@ -23,8 +23,6 @@ from hfg.graph import Graph
 from hfg.nodetypes.functions import NodeFunction
 from hfg.nodetypes.node import Node
 
-__all__ = ["SUFFIXES", "import_from_here", "load_graph", "load_module"]
-
 SUFFIXES: Final = (".apex", ".apexs")
 """Of files of CS::APEX."""
 

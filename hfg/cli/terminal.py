@@ -18,8 +18,6 @@ from rich.cells import cell_len
 
 from hfg.base import controls
 
-__all__ = ["Foot", "is_terminal"]
-
 
 def is_terminal(*streams: TextIO) -> bool:
     """Whether all of them go to a terminal that can move its cursor."""

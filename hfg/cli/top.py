@@ -23,8 +23,6 @@ from hfg.engine import Glance
 from hfg.engine.face.watching import Question
 from hfg.errors import TargetError
 
-__all__ = ["top"]
-
 _PIPE_COLUMNS = 200
 _BETWEEN_S = 1.0  # where there is one table only, rates are those of so long
 _MOST_LOOKS = 4  # while processes of parts have not answered

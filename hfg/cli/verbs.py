@@ -19,8 +19,6 @@ import typer
 import typer.core
 import typer.main
 
-__all__ = ["Verbs"]
-
 _MODULES: Final[Mapping[str, str]] = {
     **{name: name for name in ("run", "check", "convert", "draw", "nodes", "tap", "record", "play", "info", "recover")},
     **{name: name for name in ("top", "agent")},

@@ -14,8 +14,6 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
-__all__ = ["ArrayHead", "Lease", "array_problem", "bytes_of", "dtype_of", "unsafe_content", "view_of"]
-
 _NUMBERS: Final = frozenset(
     ["b1"] + [f"{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8)] + ["f2", "f4", "f8", "c8", "c16"]
 )

@@ -15,24 +15,6 @@ import numpy as np
 
 from hfg.types import accepts, describe, describe_value
 
-__all__ = [
-    "Arrays",
-    "Codec",
-    "Later",
-    "Lift",
-    "Lower",
-    "Unfit",
-    "each",
-    "each_pair",
-    "generic",
-    "leaf",
-    "lift_parts",
-    "lower_parts",
-    "optional",
-    "tagged",
-    "unchanged",
-]
-
 Arrays = list["np.ndarray[Any, Any]"]
 Lower = Callable[[Any, Arrays], Any]
 """Returns the carrier of a value, and adds its arrays to those of the frame."""

@@ -53,9 +53,6 @@ from hfg.encoding.standard import CARRIED, NATIVE, Carried
 from hfg.errors import EncodingError
 from hfg.types import accepts, array_facts, bare_type, describe, describe_value
 
-__all__ = ["codec_for", "wire_problem"]
-
-
 _NONE: Final = type(None)
 _LONGEST_NUMBER: Final = 2**16  # bytes of an integer beyond 64 bits: arithmetic on longer ones takes too long
 

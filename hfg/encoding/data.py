@@ -36,8 +36,6 @@ from hfg.encoding.records import names_of
 from hfg.errors import EncodingError
 from hfg.types import accepts, bare_type, describe, describe_value
 
-__all__ = ["decode", "encode", "has_tag", "read_text"]
-
 _WORDS: Final = {"true": True, "false": False, "none": None, "null": None}
 
 

@@ -30,20 +30,6 @@ from hfg.encoding.records import hints_of, imported, names_of
 from hfg.errors import EncodingError
 from hfg.types import accepts, bare_type, describe
 
-__all__ = [
-    "INEXACT",
-    "TAG",
-    "TEXTS",
-    "Find",
-    "already_imported",
-    "decoded",
-    "find_reference",
-    "find_tagged",
-    "is_data_type",
-    "order",
-    "reference_to",
-]
-
 TAG: Final = "$type"
 """The key in data that states its own type."""
 TEXTS: Final = (

@@ -14,8 +14,6 @@ import msgspec
 from hfg.encoding.codecs import codec_for
 from hfg.errors import EncodingError
 
-__all__ = ["description_of", "difference", "type_fingerprint"]
-
 _LONGEST: Final = 2**20
 
 

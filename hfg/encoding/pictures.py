@@ -14,8 +14,6 @@ from typing import Final, NamedTuple
 
 from hfg.base.bounds import PICTURE_PIXELS
 
-__all__ = ["need_fair_size", "pixels_problem", "size_of"]
-
 _Size = tuple[int, int]
 _TEXT: Final = 8192  # bytes in which formats with a text header have it
 _MOST_TAGS: Final = 4096

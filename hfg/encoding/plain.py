@@ -13,8 +13,6 @@ import msgspec
 
 from hfg.base.bounds import JSON_VALUES
 
-__all__ = ["json_value"]
-
 _TEXT: Final = re.compile(rb'"(?:[^"\\]|\\.)*+"', re.DOTALL)
 _MARKS: Final = (b"[", b"{", b":", b",")  # each precedes at most one value
 

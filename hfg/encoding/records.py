@@ -16,8 +16,6 @@ from typing import Any
 
 import msgspec
 
-__all__ = ["filled", "giver", "hints_of", "imported", "maker", "names_of", "required_keys"]
-
 
 def names_of(kind: Any, *, given: bool = False) -> tuple[str, ...] | None:
     """Return the names of the fields of a class; None if it is not a class with fields.

@@ -10,8 +10,6 @@ import zoneinfo
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
-__all__ = ["CARRIED", "NATIVE", "Carried"]
-
 
 class Carried(NamedTuple):
     """A class that hfg knows, whose values are carried by values of a type."""

@@ -24,8 +24,6 @@ from hfg.encoding.carriers import Codec, Unfit
 from hfg.encoding.codecs import codec_for
 from hfg.errors import EncodingError
 
-__all__ = ["Limits", "Place", "TokenCodec", "View"]
-
 T = TypeVar("T")
 
 Place = Callable[["np.ndarray[Any, Any]"], Lease | None]

@@ -25,8 +25,6 @@ from hfg.nodetypes.description import look_up
 from hfg.nodetypes.functions import NodeFunction
 from hfg.nodetypes.node import Node
 
-__all__ = ["Allowed", "installed_packages", "project_of"]
-
 _ALWAYS: Final = ("hfg", "reactivex.operators")
 _REMEDY: Final = '--allow {top} or hfg.load(..., allow=["{top}"])'
 _MARK: Final = "pyproject.toml"

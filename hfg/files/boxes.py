@@ -16,8 +16,6 @@ from hfg.graph.editing.boxes import Report, box_type
 from hfg.graph.editing.document import Document
 from hfg.graph.graph import Graph, Subgraph
 
-__all__ = ["FileBox", "file_box_type", "file_of"]
-
 Fill = Callable[[Any, Graph], None]
 """Fills the graph inside a subgraph."""
 

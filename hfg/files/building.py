@@ -35,8 +35,6 @@ from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.naming import suggest
 from hfg.nodetypes.node import Node
 
-__all__ = ["box_of_file", "build", "build_text", "load", "modules_of"]
-
 _LOGGER: Final = Log("hfg.files")
 _current: ContextVar[_Loading | None] = ContextVar("hfg.files.loading", default=None)
 

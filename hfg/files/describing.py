@@ -21,8 +21,6 @@ from hfg.graph.graph import Graph
 from hfg.graph.structure.level import Level, inside, level_of
 from hfg.nodetypes.node import Node
 
-__all__ = ["describe"]
-
 
 def describe(graph: Graph, beside: Path | None = None, *, same_program: bool = False) -> Document:
     """Make a document of a whole graph.

@@ -12,8 +12,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
-__all__ = ["emit"]
-
 _WIDTH: Final = 100  # of a list on one line
 _UNSEEN: Final = r"\x7f-\x9f\ud800-\udfff\ufeff\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
 _PLAIN: Final = re.compile(rf"[A-Za-z_/.\u00c0-\u024f](?:[^\x00-\x1f{_UNSEEN}#:\\]|:(?=[^\s]))*")

@@ -14,8 +14,6 @@ from hfg.files.opening import SUFFIX
 from hfg.graph import Graph
 from hfg.graph.editing.document import Document
 
-__all__ = ["build", "describe", "load", "read", "save", "schema", "text_of", "write"]
-
 
 def load(path: str | os.PathLike[str], *, allow: Iterable[str] = ()) -> Graph:
     """Make the graph that a file describes.

@@ -8,8 +8,6 @@ from typing import Any, TypeAlias
 from hfg.errors import FileError, Problem
 from hfg.graph.editing.from_document import Key
 
-__all__ = ["FileProblem", "Findings", "Lines", "graph_path", "split"]
-
 Lines: TypeAlias = Mapping[Key, int]
 
 

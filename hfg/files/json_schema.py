@@ -18,8 +18,6 @@ from hfg.graph.editing.commands import Operator
 from hfg.graph.editing.document import VERSION, Document, EdgeDocument
 from hfg.graph.structure.option import Fields, declared
 
-__all__ = ["json_schema", "schema_text"]
-
 _LABEL: Final = {
     "type": "string",
     "pattern": "^.+ -> .+$",

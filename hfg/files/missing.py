@@ -23,8 +23,6 @@ from hfg.nodetypes.description import EventSpec, InputSpec, NodeType, OutputSpec
 from hfg.nodetypes.node import Node
 from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS, sent_of
 
-__all__ = ["MissingNode", "missing_node", "missing_types"]
-
 _FOR_EVENTS: Final = frozenset(having(EdgeFields, "events"))
 
 

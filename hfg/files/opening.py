@@ -14,8 +14,6 @@ from hfg.base.bounds import GRAPH_FILE_BYTES
 from hfg.base.whole import read_plain
 from hfg.files.findings import Findings
 
-__all__ = ["SUFFIX", "bytes_of", "text_in"]
-
 SUFFIX: Final = ".hfg.yaml"
 """How the names of graph files end."""
 

@@ -22,8 +22,6 @@ from yaml.events import (
     SequenceStartEvent,
 )
 
-__all__ = ["DEEPEST", "MOST", "Located", "parse", "plain"]
-
 MOST: Final = 2_000_000  # values, those that aliases repeat counted again
 DEEPEST: Final = 200
 

@@ -22,8 +22,6 @@ from hfg.files.parsing import Located, parse, plain
 from hfg.graph.editing.document import VERSION, Document, EdgeDocument, NodeDocument, OperatorDocument
 from hfg.graph.editing.from_document import Key
 
-__all__ = ["Read", "read_bytes", "read_file"]
-
 _ARROW: Final = " -> "
 _SAYS: Final = ("type", "file", "graph")
 _WRONG: Final = msgspec.UNSET  # stands for a value that was reported

@@ -13,8 +13,6 @@ from typing import Any, Final
 from hfg.catalogue.describing import ParameterDescription, TypeDescription
 from hfg.encoding import TAG
 
-__all__ = ["with_types"]
-
 _LIMITS: Final = {
     "ge": "minimum",
     "gt": "exclusiveMinimum",

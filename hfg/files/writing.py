@@ -18,8 +18,6 @@ from hfg.graph.editing.document import (
     OperatorDocument,
 )
 
-__all__ = ["text_of", "write_text"]
-
 _FIRST: Final = ("hfg", "name", "notes", "groups")
 _ARROW: Final = " -> "
 

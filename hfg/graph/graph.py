@@ -37,8 +37,6 @@ from hfg.graph.structure.subgraph import Box
 from hfg.nodetypes.node import Node, Place
 from hfg.ports import EventPort, ParameterPort, Port, SlotPort, Source, Target
 
-__all__ = ["Enclosed", "Graph", "Subgraph", "graph_of"]
-
 N = TypeVar("N", bound=Node)
 T = TypeVar("T")
 Through: TypeAlias = Callable[[Observable[Any]], Observable[Any]]

@@ -25,8 +25,6 @@ from hfg.links.frames import (
 )
 from hfg.transport import Buffer, Delivery, EncodedToken, LinkOverflow, Position
 
-__all__ = ["BoundedConsumer", "BoundedConsumerCounts", "BoundedProducer", "BoundedProducerCounts"]
-
 
 class BoundedProducerCounts(msgspec.Struct):
     """Counts at the sending end.

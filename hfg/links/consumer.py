@@ -29,8 +29,6 @@ from hfg.links.frames import (
 )
 from hfg.transport import Buffer, Delivery, Position
 
-__all__ = ["ConsumerCounts", "ExactConsumer"]
-
 
 class ConsumerCounts(msgspec.Struct):
     """Counts at the receiving end.

@@ -15,27 +15,6 @@ import msgspec
 from hfg.errors import MessageTooLarge
 from hfg.transport import Buffer, EncodedToken
 
-__all__ = [
-    "LONGEST_METADATA",
-    "LONGEST_NAME",
-    "MOST_TOKENS",
-    "VERSION",
-    "FromConsumer",
-    "FromProducer",
-    "OtherVersion",
-    "Outgoing",
-    "Probe",
-    "Status",
-    "Tokens",
-    "Unreadable",
-    "batches",
-    "checked",
-    "read_from_consumer",
-    "read_from_producer",
-    "values_of",
-    "write",
-]
-
 VERSION: Final = 1
 MOST_TOKENS: Final = 1024
 """Tokens of one datagram."""

@@ -20,8 +20,6 @@ from hfg.base.controls import cleaned
 from hfg.encoding import description_of, difference, type_fingerprint
 from hfg.errors import EncodingError, UsageError
 
-__all__ = ["Introduction", "Seen", "introduce", "key_of", "need_link_name", "read_introduction", "read_name", "unfit"]
-
 VERSION: Final = 1
 _LONGEST_TYPE: Final = 12_000  # of a description: all that is announced has to fit into a key of Zenoh
 _LONGEST_NAME: Final = 400

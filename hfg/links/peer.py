@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from hfg.links.frames import Status
 
-__all__ = ["Peer"]
-
 
 class Peer:
     """One consumer, according to its statuses.

@@ -34,8 +34,6 @@ from hfg.links.frames import (
 from hfg.links.peer import Peer
 from hfg.transport import Buffer, EncodedToken, Position
 
-__all__ = ["ExactProducer", "Outbox", "ProducerCounts"]
-
 _AWAY: Final = 4
 """Number of consecutive probes without an answer, about a second, after which a consumer is reported as away."""
 

@@ -23,8 +23,6 @@ from hfg.links.frames import Outgoing
 from hfg.links.producer import ExactProducer
 from hfg.transport import Buffer, Closing, Datagrams, Delivery, EncodedToken, Message, Position, Publisher, Traffic
 
-__all__ = ["BoundedReceiver", "BoundedSender", "LinkReceiver", "LinkSender"]
-
 _LOGGER = Log("hfg.links")
 _HEADROOM = 8192  # bytes of a datagram that are kept for the header
 _TIMER_SLACK_S = 0.01

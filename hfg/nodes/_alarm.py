@@ -12,8 +12,6 @@ from typing import Final
 from hfg.base.clock import elapsed
 from hfg.nodetypes.node import Node
 
-__all__ = ["Alarm"]
-
 _INSTANT_S: Final = 1e-9
 """What is closer is now: a clock in whole nanoseconds never reaches the last digits of a sum of floats."""
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["is_encodable", "need_encodable"]
-
 
 def is_encodable(text: str) -> bool:
     """Say whether a text can be encoded as UTF-8: half of a pair of surrogates cannot."""

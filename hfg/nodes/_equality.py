@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["same"]
-
 
 def same(a: Any, b: Any) -> bool:
     """Return whether two values are equal, even if `==` gives an array or raises."""

@@ -21,8 +21,6 @@ from hfg.nodetypes.declaration import RESERVED
 from hfg.nodetypes.functions import NodeFunction, make_type
 from hfg.ports.specs import REQUIRED
 
-__all__ = ["Port", "Recipe", "Setting", "holds_reals", "make", "port_name"]
-
 
 @dataclass(frozen=True, slots=True)
 class Port:

@@ -9,8 +9,6 @@ import cv2
 from hfg.images import Picture, wrong_image
 from hfg.nodetypes.node import Node
 
-__all__ = ["colour", "gray", "need_picture", "refusal"]
-
 
 def need_picture(node: Node, image: Any, hint: Any = Picture, port: str = "image") -> None:
     """Refuse what would end the process: OpenCV's objects look at nothing before they begin.

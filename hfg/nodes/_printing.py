@@ -6,8 +6,6 @@ import sys
 
 from hfg.base.controls import escaped, is_terminal
 
-__all__ = ["print_line"]
-
 
 def print_line(text: str, *, error: bool = False) -> None:
     """Write a line to the program's output, whatever letters its terminal knows; a terminal is not steered by it."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["slack_s"]
-
 
 def slack_s(span_s: float, stamp: float) -> float:
     """Return by how much a stamp may miss the end of a span because floats are rounded.

@@ -17,8 +17,6 @@ from hfg.graph import Graph
 from hfg.parts.transports import open_session
 from hfg.transport import Session
 
-__all__ = ["Share", "share"]
-
 _Key: TypeAlias = tuple[str, str]
 
 _OPEN: Final[WeakKeyDictionary[Graph, dict[_Key, _Shared]]] = WeakKeyDictionary()

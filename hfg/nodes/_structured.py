@@ -19,8 +19,6 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-__all__ = ["cascade_of", "model_of", "need_harmless", "trust"]
-
 _KINDS: Final[Mapping[str, Callable[[], Any]]] = {
     "opencv_ml_rtrees": cv2.ml.RTrees.create,
     "opencv_ml_knn": cv2.ml.KNearest.create,

@@ -28,18 +28,6 @@ from hfg.ports.states import State
 from hfg.ports.vectors import Events, Inputs, Outputs, Slots, Vector, VectorSpec
 from hfg.types import describe, is_hint
 
-__all__ = [
-    "HOOKS",
-    "RESERVED",
-    "Declaration",
-    "Shared",
-    "check_names",
-    "declare",
-    "install_ports",
-    "shared_names",
-    "snake_case",
-]
-
 HOOKS: Final = ("setup", "ready", "end", "teardown", "on_activated", "on_deactivated", "do")
 """Methods of a node that a runner calls in addition to `process`."""
 

@@ -20,21 +20,6 @@ from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.ports.states import State
 from hfg.ports.vectors import VectorSpec, element
 
-__all__ = [
-    "EventSpec",
-    "InputSpec",
-    "NodeType",
-    "OutputSpec",
-    "ProcessKind",
-    "Result",
-    "SlotSpec",
-    "TypesByName",
-    "look_up",
-    "parameter_values",
-    "read_only_refusal",
-    "unknown_parameter",
-]
-
 ProcessKind = Literal["none", "function", "async", "generator", "async generator"]
 Result = Literal["none", "single", "fields"]
 

@@ -31,8 +31,6 @@ from hfg.ports.specs import ParameterSpec
 from hfg.ports.vectors import Inputs, Outputs, Vector
 from hfg.types import describe
 
-__all__ = ["FunctionNode", "NodeFunction", "make_type", "node"]
-
 P = ParamSpec("P")
 R = TypeVar("R")
 T = TypeVar("T")

@@ -16,18 +16,6 @@ from hfg.base.token import Token
 from hfg.errors import DeclarationError
 from hfg.nodetypes.description import ProcessKind
 
-__all__ = [
-    "MISSING",
-    "function_name",
-    "hints_of",
-    "hints_of_class",
-    "is_iterator",
-    "kind_of",
-    "output_type",
-    "result_of",
-    "split_token",
-]
-
 _NONE: Final = type(None)
 _SYNC_ITERATORS: Final = (abc.Iterator, abc.Generator)
 _ASYNC_ITERATORS: Final = (abc.AsyncIterator, abc.AsyncGenerator)

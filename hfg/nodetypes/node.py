@@ -19,7 +19,8 @@ from hfg.base.token import Token
 from hfg.base.values import own_copy
 from hfg.errors import DeclarationError, EngineInternalError, Failure, NotRunning, UsageError, shown
 from hfg.nodetypes.declaration import declare
-from hfg.nodetypes.description import NodeType, parameter_values, read_only_refusal, unknown_parameter
+from hfg.nodetypes.description import NodeType as NodeType  # also named from here by code of upper layers
+from hfg.nodetypes.description import parameter_values, read_only_refusal, unknown_parameter
 from hfg.nodetypes.vectors import Vectors
 from hfg.ports.automatic import (
     AUTOMATIC_EVENTS,
@@ -37,8 +38,6 @@ from hfg.ports.outputs import OutputPort
 from hfg.ports.parameters import ParameterPort
 from hfg.ports.slots import SlotPort
 from hfg.ports.views import Ports
-
-__all__ = ["Node", "NodeType", "Place"]
 
 Other = TypeVar("Other")
 

@@ -21,8 +21,6 @@ from hfg.ports.parameters import spec_of
 from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.types import describe
 
-__all__ = ["CallPlan", "Signature", "read_signature"]
-
 _POSITIONAL: Final = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 
 

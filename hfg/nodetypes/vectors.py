@@ -21,8 +21,6 @@ from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.ports.vectors import Slots, Vector, VectorSpec, element
 from hfg.types import is_hint
 
-__all__ = ["Sizes", "Vectors", "list_of", "size_parameters", "vector_specs"]
-
 Sizes = tuple[int, ...]
 
 _SHOWN_SIZE: Final = 1

@@ -52,8 +52,6 @@ from hfg.parts.steering.editing import Drawing
 from hfg.parts.steering.reports import Counts, whole_report
 from hfg.parts.steering.run import CutRun
 
-__all__ = ["Distribution", "distribute"]
-
 _LOGGER = Log("hfg.parts")
 _PATIENCE_S = 1.0  # how long a lossy signal may be in transit while nothing else moves
 _MOST_LOGGERS = 1000  # that other parts may use here

@@ -12,8 +12,6 @@ from hfg.errors import TransportError, in_words
 from hfg.links.local import LocalSession, LocalTransport
 from hfg.transport import Session, Transport
 
-__all__ = ["open_session", "open_sessions", "transport"]
-
 _GROUP: Final = "hfg.transports"
 _REMEDY: Final = {"zenoh": "pip install 'hfg[zenoh]'"}
 _ELSE: Final = "install the package with it"

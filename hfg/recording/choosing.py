@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 from typing import Any, NamedTuple
 
-from hfg.nodetypes.node import NodeType
+from hfg.nodetypes.description import NodeType
 from hfg.ports.automatic import AUTOMATIC_EVENTS, sent_of
-
-__all__ = ["Choice", "Recorded", "idle_nodes"]
 
 
 class Recorded(NamedTuple):

@@ -18,21 +18,6 @@ import zstandard
 
 from hfg.base.bounds import CHUNK_BYTES, CHUNK_MESSAGES
 
-__all__ = [
-    "CHANNEL",
-    "CHUNK",
-    "HEAD",
-    "MESSAGE",
-    "SCHEMA",
-    "ChunkHead",
-    "Content",
-    "Damaged",
-    "Message",
-    "chunk_head",
-    "content_of",
-    "unpacked",
-]
-
 HEAD: Final = struct.Struct("<BQ")
 """The head of each record: its kind and its length."""
 SCHEMA, CHANNEL, MESSAGE, CHUNK = 3, 4, 5, 6

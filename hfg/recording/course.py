@@ -20,8 +20,6 @@ from hfg.recording.messages import EVENTS
 from hfg.recording.reading import number_in
 from hfg.recording.seeking import Seeking
 
-__all__ = ["Course", "Failed", "Span"]
-
 _MOST_SPANS: Final = 500_000
 _MOST_SETTINGS: Final = 200_000
 _MOST_BYTES: Final = 64 * 2**20  # of the texts of settings and edits

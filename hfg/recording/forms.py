@@ -15,8 +15,6 @@ import numpy as np
 
 from hfg.encoding.records import hints_of, names_of
 
-__all__ = ["PLAIN_TYPES", "Form", "bare", "fields_of", "form_of", "is_plain", "reference"]
-
 PLAIN_TYPES: Final = frozenset({bool, int, float, str})
 """Types whose values are immutable and can be written as JSON."""
 

@@ -25,8 +25,6 @@ from hfg.base.bounds import CHUNK_BYTES
 from hfg.recording.chunks import CHUNK, HEAD, MESSAGE, Damaged, chunk_head
 from hfg.recording.mcap import MAGIC
 
-__all__ = ["Layout", "Piece", "read_record"]
-
 _FOOTER: Final = HEAD.size + 20 + len(MAGIC)
 _LONGEST_RECORD: Final = 64 * 2**20  # except chunks, messages and attachments
 _PIECE: Final = 4 * 2**20  # bytes of messages outside chunks that are read at once

@@ -17,8 +17,6 @@ import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["MAGIC", "Writer"]
-
 Array: TypeAlias = npt.NDArray[Any]
 
 MAGIC: Final = b"\x89MCAP0\r\n"

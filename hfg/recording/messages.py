@@ -23,22 +23,6 @@ from hfg.recording.values import CannotKeep, Codec
 from hfg.trace import TraceEvent
 from hfg.types import describe, describe_value
 
-__all__ = [
-    "EVENTS",
-    "ITEM",
-    "MARKERS",
-    "Firings",
-    "Images",
-    "Marked",
-    "PlainToken",
-    "Timed",
-    "TokenReader",
-    "TokenWriter",
-    "TokensLeftOut",
-    "Told",
-    "circumstances",
-]
-
 ITEM: Final = 5
 """Entries per token in the writer's queue, one flat list, which gives the garbage collector nothing to look at.
 

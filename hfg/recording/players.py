@@ -23,8 +23,6 @@ from hfg.nodetypes.node import Node
 from hfg.recording.reading import File, Loss
 from hfg.recording.tracks import Record, Step, Track
 
-__all__ = ["Player", "tell_losses"]
-
 _SAME_MOMENT_S: Final = 1e-9
 _LOGGER: Final = Log("hfg.recording")
 

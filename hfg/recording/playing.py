@@ -23,15 +23,14 @@ from hfg.graph import Graph, commands
 from hfg.graph.flat import flatten
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
-from hfg.nodetypes.node import Node, NodeType
+from hfg.nodetypes.description import NodeType
+from hfg.nodetypes.node import Node
 from hfg.ports.automatic import sent_of
 from hfg.recording.choosing import Choice, Recorded, idle_nodes
 from hfg.recording.messages import MARKERS
 from hfg.recording.reading import File, RecordingInfo
 from hfg.recording.stand_ins import How, stand_in
 from hfg.recording.tracks import recorded_ports
-
-__all__ = ["Playing", "play_into"]
 
 _LOGGER = Log("hfg.recording")
 _BESIDE: Final = b'"beside":true'

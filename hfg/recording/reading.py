@@ -22,8 +22,6 @@ from hfg.recording.layout import Layout, read_record
 from hfg.recording.mcap import MAGIC
 from hfg.recording.messages import EVENTS, MARKERS
 
-__all__ = ["RECOVERED", "File", "Loss", "PortInfo", "RawMessage", "RecordingInfo", "number_in"]
-
 _KEPT_CHUNKS: Final = 8
 _KEPT_BYTES: Final = 64 * 2**20
 _MOST_TOLD: Final = 100

@@ -30,8 +30,6 @@ from hfg.recording.messages import ITEM, TokensLeftOut, TokenWriter, Told
 from hfg.recording.writing import RecordingWriter
 from hfg.trace import TraceEvent
 
-__all__ = ["MOST_BYTES", "MOST_ITEMS", "Recorder"]
-
 _LOGGER = Log("hfg.engine")
 
 MOST_ITEMS: Final = 50_000

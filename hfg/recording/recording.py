@@ -26,8 +26,6 @@ from hfg.recording.recorder import Recorder
 from hfg.recording.writing import RecordingWriter, open_new
 from hfg.types import describe
 
-__all__ = ["Recording", "ports_of", "record"]
-
 _LOGGER = Log("hfg.recording")
 _PATTERN: Final = frozenset("*?[")
 VERSION: Final = 2

@@ -23,8 +23,6 @@ from hfg.recording.layout import read_record
 from hfg.recording.reading import RECOVERED, File, Loss
 from hfg.recording.writing import is_there
 
-__all__ = ["recover"]
-
 
 def recover(
     file: str | os.PathLike[str], output: str | os.PathLike[str], *, force: bool = False

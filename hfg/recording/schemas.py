@@ -15,8 +15,6 @@ import numpy as np
 from hfg.recording.forms import bare, form_of
 from hfg.types import Pixels, describe
 
-__all__ = ["COMPRESSED_IMAGE", "RAW_IMAGE", "encoding_of", "is_image", "message_schema"]
-
 _TIME: Final = {
     "type": "object",
     "title": "time",

@@ -21,8 +21,6 @@ import numpy.typing as npt
 from hfg.recording.chunks import HEAD, MESSAGE, Damaged, content_of
 from hfg.recording.reading import File, Loss
 
-__all__ = ["MOST_MARKS", "Found", "Seeking"]
-
 T = TypeVar("T")
 Array = npt.NDArray[Any]
 

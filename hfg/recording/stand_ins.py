@@ -11,12 +11,11 @@ from typing import Any, Final, NamedTuple
 from weakref import WeakKeyDictionary
 
 from hfg.graph.structure.level import level_of
-from hfg.nodetypes.node import Node, NodeType
+from hfg.nodetypes.description import NodeType
+from hfg.nodetypes.node import Node
 from hfg.recording.players import Player
 from hfg.recording.reading import File
 from hfg.recording.tracks import Track
-
-__all__ = ["How", "stand_in"]
 
 _numbers: Final = itertools.count(1)
 

@@ -19,8 +19,6 @@ from hfg.recording.messages import EVENTS, MARKERS, TokenReader
 from hfg.recording.reading import File, number_in
 from hfg.types import accepts, describe
 
-__all__ = ["Record", "Step", "Track", "recorded_ports"]
-
 _PROCESSED = "processed"
 _MOST_LOST: Final = 100_000  # firings; larger numbers are not trusted because a file can contain any number
 

@@ -29,8 +29,6 @@ from hfg.encoding.records import imported
 from hfg.errors import HfgError
 from hfg.recording.forms import bare, fields_of, form_of, reference
 
-__all__ = ["CannotKeep", "Codec", "array_fields"]
-
 _TAG: Final = "$type"
 _NONE: Final = type(None)
 

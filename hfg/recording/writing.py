@@ -38,8 +38,6 @@ from hfg.recording.messages import (
 )
 from hfg.trace import NodeEnabled, StructureChanged
 
-__all__ = ["PROFILE", "RecordingWriter", "is_there", "open_new"]
-
 PROFILE: Final = "hfg"
 _CHUNK_BYTES: Final = 1024 * 1024
 _CHUNK_MESSAGES: Final = 20_000

@@ -22,8 +22,6 @@ from hfg.graph.drawing.text import escaped
 from hfg.reporting.observing import MOST_NODES, SPANS, Observed
 from hfg.reporting.pictures import png
 
-__all__ = ["Page", "drawing"]
-
 _MOST_ROWS: Final = 2000  # rows of a table
 _MOST_DRAWN: Final = 600  # nodes; in a larger graph, subgraphs are collapsed
 _RULES: Final = (

@@ -27,8 +27,6 @@ from hfg.trace import (
     TraceEvent,
 )
 
-__all__ = ["MOST_ERRORS", "MOST_TIMES", "SPANS", "Gallery", "Observed", "Rows", "Times"]
-
 SPANS: Final = 240  # time spans for counting firings; at most twice as many
 MOST_TIMES: Final = 1000  # times of activity per node
 MOST_NODES: Final = 2000  # nodes whose times are kept: a graph that is edited while it runs can have any number

@@ -19,8 +19,6 @@ from hfg.reporting.observing import Observed
 from hfg.reporting.sections import Sections
 from hfg.trace import RunEnded, TraceEvent
 
-__all__ = ["ReportPage", "report_page"]
-
 _LOG = Log("hfg.engine")
 _MOST_PICTURES: Final = 1000
 _LONGEST_SIDE: Final = 4096

@@ -12,8 +12,6 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["is_picture", "png", "smaller"]
-
 Pixels = npt.NDArray[Any]
 
 _LEAST: Final = 8  # pixels in either direction; a smaller array is a table of numbers

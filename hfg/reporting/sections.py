@@ -21,8 +21,6 @@ from hfg.graph import Graph
 from hfg.graph.drawing.text import escaped
 from hfg.reporting.pictures import is_picture, png
 
-__all__ = ["Sections"]
-
 _PICTURES: Final = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg", ".gif": "gif", ".webp": "webp", ".svg": "svg+xml"}
 _VIDEOS: Final = {".webm": "webm", ".mp4": "mp4", ".ogv": "ogg"}
 _MOST_BYTES: Final = 64 * 2**20  # bytes of a file: pages with more open slowly

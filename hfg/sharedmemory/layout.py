@@ -13,8 +13,6 @@ from __future__ import annotations
 import struct
 from typing import Final
 
-__all__ = ["HEAD", "LANE_SIZE", "MAGIC", "MOST_LANE", "MOST_SLOTS", "PAGE", "WORDS", "pages", "segment_size"]
-
 HEAD: Final = struct.Struct("<8sQQ")
 """Magic number, number of slots, bytes per slot."""
 MAGIC: Final = b"hfgring2"

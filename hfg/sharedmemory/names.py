@@ -22,8 +22,6 @@ from hfg.errors import SharedMemoryError
 if sys.platform == "linux":
     import fcntl
 
-__all__ = ["create", "open_existing", "remove", "segment_name", "segment_prefix", "sweep", "unavailable"]
-
 _FOLDER: Final = Path("/dev/shm")
 _PART: Final = re.compile(r"[A-Za-z0-9_]{1,48}")
 _NAME: Final = re.compile(r"hfg(-[A-Za-z0-9_]{1,48}){4}(\.[0-9]{1,9})?")

@@ -19,8 +19,6 @@ from hfg.errors import SharedMemoryError
 from hfg.sharedmemory.layout import HEAD, LANE_SIZE, MAGIC, MOST_SLOTS, PAGE, WORDS, segment_size
 from hfg.sharedmemory.names import open_existing
 
-__all__ = ["Reader"]
-
 
 class Reader:
     """One consumer's views of the arrays in one ring.

@@ -22,8 +22,6 @@ from hfg.errors import SharedMemoryError, UsageError
 from hfg.sharedmemory.layout import HEAD, LANE_SIZE, MAGIC, MOST_LANE, MOST_SLOTS, PAGE, WORDS, pages, segment_size
 from hfg.sharedmemory.names import create, remove
 
-__all__ = ["Ring", "RingCounts"]
-
 _SMALLEST: Final = 2**16
 """Below this size a copy is cheaper than a lease."""
 

@@ -19,8 +19,6 @@ from hfg.files.apex.table import ParameterRule, TypeRule, rule_of
 from hfg.files.findings import Findings
 from hfg.graph.editing.document import BoxDocument, Document, EdgeDocument, GroupDocument, NodeDocument
 
-__all__ = ["convert"]
-
 _NOTE: Final = "csapex::Note"
 _GRAPH: Final = "csapex::Graph"
 _DEFAULT_RATE_HZ: Final = 60.0  # what CS::APEX limits every node to unless it says another rate

@@ -6,8 +6,6 @@ from typing import Any
 
 import msgspec
 
-__all__ = ["ApexConnection", "ApexFile", "ApexGraph", "ApexNode", "ApexParameter", "ApexThread"]
-
 
 class ApexParameter(msgspec.Struct):
     """A parameter of a node.

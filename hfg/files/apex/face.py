@@ -10,8 +10,6 @@ from hfg.files.apex.report import ConversionReport
 from hfg.graph import Graph
 from hfg.graph.editing.document import Document
 
-__all__ = ["load", "read"]
-
 
 def read(path: str | os.PathLike[str]) -> tuple[Document, ConversionReport]:
     """Read a file of CS::APEX as what a graph file would say, and tell what became of each node and connection.

@@ -15,8 +15,6 @@ import msgspec
 from hfg.files.apex.document import ApexParameter
 from hfg.files.apex.table import TypeRule
 
-__all__ = ["file_importer"]
-
 _PICTURES: Final = (".bmp", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".webp")
 _ALL: Final = ("", ".*")
 

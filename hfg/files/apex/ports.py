@@ -13,8 +13,6 @@ from typing import Final
 
 from hfg.files.apex.table import TypeRule
 
-__all__ = ["AUTOMATIC", "Missing", "Ports", "is_source", "parts"]
-
 AUTOMATIC: Final[dict[str, tuple[str, ...]]] = {
     "event": ("activated", "deactivated", "processed"),
     "slot": ("enable", "disable"),

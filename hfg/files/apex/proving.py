@@ -22,8 +22,6 @@ from hfg.graph.structure.level import level_of
 from hfg.graph.structure.paths import node_at
 from hfg.nodetypes.node import Node
 
-__all__ = ["prove"]
-
 _BARE: Final = ("activated", "deactivated", "processed", "failed", "timeout")
 
 

@@ -15,8 +15,6 @@ from hfg.files.findings import Findings
 from hfg.files.opening import bytes_of, text_in
 from hfg.files.parsing import Located, parse, plain
 
-__all__ = ["SEPARATOR", "SUFFIXES", "read_file"]
-
 SUFFIXES: Final = (".apex", ".apexs")
 SEPARATOR: Final = ":|:"
 

@@ -6,8 +6,6 @@ from typing import Literal
 
 import msgspec
 
-__all__ = ["ConversionReport", "Converted", "State"]
-
 State = Literal["mapped", "approximated", "missing"]
 
 

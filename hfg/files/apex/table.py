@@ -12,8 +12,6 @@ from typing import Any, Final, Literal
 import msgspec
 import yaml
 
-__all__ = ["As", "ParameterRule", "TypeRule", "rule_of", "rules"]
-
 As = Literal["same", "float", "lower", "square", "first", "second", "from", "into", "ending"]
 
 _NAMESPACES: Final = ("csapex::", "vision_plugins::", "csapex::vision_plugins::")

@@ -17,9 +17,8 @@ from typing import Any, Final
 
 from hfg.errors import Problem
 from hfg.graph.flat import FlatGraph, FlatNode
-from hfg.nodetypes.node import Node, NodeType
-
-__all__ = ["changed_inputs"]
+from hfg.nodetypes.description import NodeType
+from hfg.nodetypes.node import Node
 
 _STORES: Final = frozenset(
     dis.opmap[name] for name in ("STORE_SUBSCR", "DELETE_SUBSCR", "STORE_SLICE", "STORE_ATTR") if name in dis.opmap

@@ -40,8 +40,6 @@ from hfg.graph.checks.processes import process_borders
 from hfg.graph.flat import FlatGraph, flatten
 from hfg.graph.structure.level import HasLevel
 
-__all__ = ["Check", "also", "check", "check_flat"]
-
 Check: TypeAlias = Callable[[FlatGraph], Iterable[Problem]]
 
 _OF_EACH_LEVEL: Final[list[Check]] = [

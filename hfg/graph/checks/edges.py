@@ -15,8 +15,6 @@ from hfg.graph.structure.level import inside
 from hfg.ports import ParameterPort
 from hfg.types import describe, why_not
 
-__all__ = ["borders", "joined_edges", "promotions", "unseen_parameters"]
-
 
 def joined_edges(flat: FlatGraph) -> Iterator[Problem]:
     """The options of each part of an edge through subgraphs must fit the whole edge (rules P2, P3, P4, P7)."""

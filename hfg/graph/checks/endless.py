@@ -21,8 +21,6 @@ from typing import Any, Final
 from hfg.graph.flat import ROOT, FlatGraph, FlatNode, scope_end
 from hfg.nodetypes.description import NodeType
 
-__all__ = ["endless", "runs_for_ever"]
-
 _HARMLESS_CALLS: Final = frozenset(
     {"abs", "bool", "bytes", "dict", "float", "int", "isinstance", "len", "list", "max", "min", "print", "repr"}
     | {"round", "set", "str", "sum", "tuple"}

@@ -19,19 +19,6 @@ from hfg.graph.flat.order import rings, shortest_ring
 from hfg.nodetypes.node import Node
 from hfg.ports.automatic import sent_of
 
-__all__ = [
-    "endless_sources",
-    "filling_rings",
-    "never_fires",
-    "signal_rings",
-    "silent_events",
-    "synchronous_rings",
-    "unconnected_graph",
-    "unconnected_inputs",
-    "unfed_slots",
-    "waiting_rings",
-]
-
 
 def synchronous_rings(flat: FlatGraph) -> Iterator[Problem]:
     """Cycles of synchronous edges without an initial token: each node waits for the one before it (rule P7)."""

@@ -9,8 +9,6 @@ from hfg.graph.flat.cutting import MAIN, cut
 from hfg.graph.flat.flat_graph import LINK, ROOT, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.ports.automatic import AUTOMATIC_SLOTS
 
-__all__ = ["kept_groups"]
-
 
 def kept_groups(flat: FlatGraph) -> Iterator[Problem]:
     """Find what a ledger cannot keep of the groups that have one."""

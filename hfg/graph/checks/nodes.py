@@ -18,21 +18,6 @@ from hfg.graph.structure.options import NodeOptions
 from hfg.nodetypes.node import Node
 from hfg.ports import Port
 
-__all__ = [
-    "async_in_threads",
-    "codes_in",
-    "concurrent_firings",
-    "empty_subgraphs",
-    "functions_of",
-    "limits_without_effect",
-    "missing_process",
-    "names",
-    "needs_loop",
-    "unknown_attributes",
-    "unknown_groups",
-    "unused_scheduling",
-]
-
 
 def unknown_groups(flat: FlatGraph) -> Iterator[Problem]:
     """Nodes in groups that are not declared."""

@@ -10,8 +10,6 @@ from hfg.graph.flat.cutting import MAIN, cut
 from hfg.graph.flat.flat_graph import FlatGraph
 from hfg.graph.flat.order import rings
 
-__all__ = ["process_borders"]
-
 
 def process_borders(flat: FlatGraph) -> Iterator[Problem]:
     """Find what two processes would have to share, and edges between them that are not for data."""

@@ -23,8 +23,6 @@ from hfg.graph.structure.paths import meant, node_at
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node
 
-__all__ = ["FORMATS", "dot", "draw", "mermaid", "view_of"]
-
 
 def draw(
     graph: HasLevel,

@@ -10,8 +10,6 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
-__all__ = ["Badge", "EdgeEnds", "Layout", "Line", "NodeBox", "Point", "PortSpot", "Tag"]
-
 Point: TypeAlias = tuple[float, float]
 
 

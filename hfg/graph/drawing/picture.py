@@ -18,10 +18,9 @@ from hfg.graph.structure.naming import path_of
 from hfg.graph.structure.option import declared
 from hfg.graph.structure.options import EdgeOptions, NodeOptions
 from hfg.graph.structure.subgraph import is_box
-from hfg.nodetypes.node import Node, NodeType
+from hfg.nodetypes.description import NodeType
+from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, Port
-
-__all__ = ["picture"]
 
 _LAST: Final = 1_000_000  # ports that every node has come after its own
 

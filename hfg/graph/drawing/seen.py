@@ -9,8 +9,6 @@ import msgspec
 
 from hfg.nodetypes.node import Node
 
-__all__ = ["EVERYTHING", "Arrow", "Kind", "Look", "Picture", "Pin", "Shape", "View"]
-
 Kind: TypeAlias = Literal["activity", "mission", "all"]
 Look: TypeAlias = Literal["node", "box", "port", "start", "stop", "feed"]
 

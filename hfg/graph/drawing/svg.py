@@ -29,8 +29,6 @@ from hfg.graph.drawing.text import FONTS, escaped, is_measured, shortened, width
 from hfg.graph.drawing.tokens import STYLE, stripe
 from hfg.graph.structure.level import HasLevel
 
-__all__ = ["svg"]
-
 _MARGIN: Final = 20.0
 _ROUND: Final = 6.0  # of corners
 _PORT_SIZE: Final = 4.5

@@ -9,8 +9,6 @@ from __future__ import annotations
 import unicodedata
 from typing import Final
 
-__all__ = ["FONTS", "escaped", "is_measured", "shortened", "width_of"]
-
 FONTS: Final = "Inter, 'Helvetica Neue', Arial, 'Liberation Sans', system-ui, sans-serif"
 
 _BOLD: Final = 1.08  # by how much a bold text is wider

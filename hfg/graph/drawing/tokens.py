@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-__all__ = ["STYLE", "stripe"]
-
 _TOKENS: Final = {
     "canvas": ("#f3f5f8", "#0f1318"),
     "raised": ("#ffffff", "#1f2730"),

@@ -23,8 +23,6 @@ from hfg.ports import Event, Input, Output, Parameter, ParameterSpec, slot
 from hfg.ports.conditions import Condition
 from hfg.ports.kinds import choices_of, type_of_choices
 
-__all__ = ["DECLARED", "Report", "box_type", "box_with", "is_free", "parameter_as_data"]
-
 Report: TypeAlias = Callable[[str, str, str], None]
 """Receives the kind and the name of a port that cannot be made, and why."""
 

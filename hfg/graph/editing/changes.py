@@ -23,24 +23,6 @@ from hfg.graph.structure.options import NodeOptions
 from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort
 
-__all__ = [
-    "Change",
-    "EdgeChange",
-    "EdgeSwap",
-    "GateChange",
-    "GroupsChange",
-    "NodeChange",
-    "NodeCopied",
-    "NodeSwap",
-    "NotesChange",
-    "OptionsChange",
-    "ParameterChange",
-    "PortChange",
-    "PromotionChange",
-    "Renaming",
-    "undo_all",
-]
-
 
 @dataclass(eq=False)
 class Change:

@@ -12,8 +12,6 @@ from hfg.base.hooks import hooks
 from hfg.encoding import TAG
 from hfg.errors import GraphError
 
-__all__ = ["Command", "decode", "encode", "read"]
-
 
 class _Sentence(msgspec.StructMeta):
     """Makes wrong calls of commands raise an error of hfg that shows the call to write."""

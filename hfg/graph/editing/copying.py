@@ -13,8 +13,6 @@ from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, Port
 
-__all__ = ["copy_of"]
-
 End = TypeVar("End")
 
 

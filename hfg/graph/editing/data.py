@@ -14,8 +14,6 @@ from hfg.graph.structure.edge import Edge, TargetEnd, type_of
 from hfg.graph.structure.operators import NamedOperator, find_operator
 from hfg.graph.structure.options import EdgeGiven
 
-__all__ = ["Convert", "edge_as_data", "edge_as_meant"]
-
 Convert: TypeAlias = Callable[[Any, Any], Any]
 """Makes data of a value, or a value of data; takes the type as well."""
 

@@ -18,8 +18,6 @@ from hfg.graph.editing.to_commands import as_commands
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.paths import node_at, parameter_at
 
-__all__ = ["difference"]
-
 _BESIDES = ("group", "enabled")
 """Options of a node that a command changes; with others it is another node."""
 

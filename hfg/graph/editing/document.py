@@ -22,21 +22,6 @@ from hfg.graph.editing.commands import EdgeSaid, Operator
 from hfg.graph.structure.option import declared
 from hfg.graph.structure.options import EdgeGiven, GroupFields, NodeFields
 
-__all__ = [
-    "NODE_OPTIONS",
-    "PORT_KINDS",
-    "VERSION",
-    "BoxDocument",
-    "Document",
-    "EdgeDocument",
-    "GateDocument",
-    "GroupDocument",
-    "InsideDocument",
-    "NodeDocument",
-    "OperatorDocument",
-    "ParameterDocument",
-]
-
 VERSION: Final = 1
 PORT_KINDS: Final = ("inputs", "outputs", "events", "slots")
 

@@ -24,8 +24,6 @@ from hfg.graph.structure.subgraph import Box
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, ParameterPort, Port
 
-__all__ = ["dissolve", "enclose"]
-
 Do: TypeAlias = Callable[[Change], None]
 End: TypeAlias = SourceEnd | TargetEnd
 

@@ -32,8 +32,6 @@ from hfg.graph.structure.paths import node_at, parameter_at, source_at, target_a
 from hfg.graph.structure.refusals import raise_refusals
 from hfg.nodetypes.node import Node
 
-__all__ = ["Builder", "Key"]
-
 Key: TypeAlias = tuple[str | int, ...]
 """A place in a document: ("nodes", "camera", "parameters", "rate_hz"), ("edges", 3)."""
 

@@ -16,8 +16,6 @@ from hfg.nodetypes.node import Node
 from hfg.ports import ParameterSpec
 from hfg.types import accepts
 
-__all__ = ["as_meant", "fitting", "kept", "made"]
-
 
 def made(reference: str, parameters: dict[str, Any], path: str, find: Find | None = None) -> Node:
     """Make a node of a type that is found by name.

@@ -29,8 +29,6 @@ from hfg.graph.structure.option import given
 from hfg.graph.structure.options import PLAIN, EdgeOptions, GroupGiven, GroupSpec
 from hfg.graph.structure.paths import level_and_name, node_at, parameter_at, source_at, target_at
 
-__all__ = ["perform"]
-
 
 def perform(level: Level, commands: Sequence[c.Command]) -> list[Change]:
     """Carry commands out, one after the other; all of them or, when one is refused, none.

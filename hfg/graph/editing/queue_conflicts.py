@@ -18,8 +18,6 @@ from hfg.graph.structure.option import written
 from hfg.graph.structure.options import EdgeOptions
 from hfg.ports import InnerSource, InnerTarget, Port
 
-__all__ = ["refuse_other_queues"]
-
 
 def refuse_other_queues(
     level: Level,

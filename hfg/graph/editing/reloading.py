@@ -22,8 +22,6 @@ from hfg.graph.structure.level import HasLevel, inside, level_of
 from hfg.nodetypes.functions import NodeFunction
 from hfg.nodetypes.node import Node
 
-__all__ = ["reloaded"]
-
 _once_known_as: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
 """The references of types that were reloaded: nothing has them any more, but undo brings their nodes back."""
 

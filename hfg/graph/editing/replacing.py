@@ -20,8 +20,6 @@ from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node
 from hfg.ports import Port
 
-__all__ = ["replace"]
-
 
 def replace(steps: Steps, old: Node, new: Node) -> list[tuple[Level, Edge]]:
     """Replace a node by one that is in no graph yet.

@@ -46,8 +46,6 @@ from hfg.graph.structure.places import side_of
 from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort
 
-__all__ = ["Multiplied", "Promoted", "Steps", "edges_of"]
-
 Promoted: TypeAlias = dict[str, list[ParameterPort[Any]]]
 
 

@@ -18,8 +18,6 @@ from hfg.graph.editing.steps import Steps
 from hfg.graph.editing.to_document import Describer
 from hfg.graph.structure.level import Level, Whole
 
-__all__ = ["as_commands"]
-
 
 def as_commands(level: Level) -> list[c.Command]:
     """See `Graph.as_commands`.

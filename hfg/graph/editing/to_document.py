@@ -40,8 +40,6 @@ from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, Port
 from hfg.ports.specs import REQUIRED
 
-__all__ = ["Describer"]
-
 
 class Describer:
     """Describes one whole graph; the graph stays as it is, and may be running.

@@ -36,18 +36,6 @@ from hfg.graph.flat import flatten
 from hfg.graph.structure.history import History
 from hfg.graph.structure.level import HasLevel, level_of
 
-__all__ = [
-    "Transaction",
-    "edit",
-    "history_of",
-    "may_break",
-    "prepare",
-    "redo",
-    "refuse_new_errors",
-    "reload",
-    "undo",
-]
-
 _MAY_BREAK = (Add, ChangeGroup, Connect, Copy, Dissolve, Enclose, Move, Promote, Replace, SetEdge)
 """Commands after which something may be wrong that only the whole shows."""
 

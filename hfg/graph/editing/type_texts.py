@@ -14,8 +14,6 @@ from typing import Any, Literal, Union, get_args, get_origin
 from hfg.errors import GraphError
 from hfg.nodetypes.description import look_up
 
-__all__ = ["text_of_type", "type_of_text"]
-
 
 def text_of_type(hint: object) -> str | None:
     """Return what `type_of_text` reads; None for a type that has no name."""

@@ -17,8 +17,6 @@ from hfg.errors import Problem
 from hfg.graph.flat.flat_graph import LINK, ROOT, End, FlatEdge, FlatGate, FlatGraph, FlatNode, Scope, scope_end
 from hfg.graph.structure.options import EdgeGiven, GroupSpec
 
-__all__ = ["DEFAULT_WINDOW", "MAIN", "CutEdge", "Cutting", "cut"]
-
 MAIN: Final = ""
 """The part that runs where the graph is run."""
 

@@ -16,8 +16,6 @@ from hfg.graph.structure.level import HasLevel, Level, level_of
 from hfg.graph.structure.options import EdgeOptions, GroupSpec, NodeOptions
 from hfg.nodetypes.node import Node
 
-__all__ = ["LINK", "ROOT", "End", "EndKind", "FlatEdge", "FlatGate", "FlatGraph", "FlatNode", "Scope", "scope_end"]
-
 EndKind: TypeAlias = Literal["input", "output", "event", "slot", "parameter", "observable"]
 
 ROOT: Final = -1

@@ -24,8 +24,6 @@ from hfg.graph.structure.subgraph import iterated
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, ParameterPort, Port
 
-__all__ = ["EdgeFollower", "flatten"]
-
 
 def flatten(graph: HasLevel) -> FlatGraph:
     """Dissolve all subgraphs of a whole graph; the graph stays as it is."""

@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 
-__all__ = ["rings", "shortest_ring", "strongly_connected"]
-
 
 def strongly_connected(successors: Sequence[Sequence[int]]) -> list[list[int]]:
     """Return the strongly connected parts, each sorted; a part comes after those it leads to.

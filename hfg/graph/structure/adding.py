@@ -18,8 +18,6 @@ from hfg.graph.structure.refusals import Refusable
 from hfg.graph.structure.subgraph import Box, is_box
 from hfg.nodetypes.node import Node
 
-__all__ = ["add", "need_fitting"]
-
 
 def add(level: Level, node: Node, name: str | None, given: NodeGiven) -> None:
     """Add a node; a subgraph builds its inside now.

@@ -11,8 +11,6 @@ from typing import Any, TypeVar
 from hfg.ports import EventPort, InputPort, OutputPort, Port, SlotPort
 from hfg.ports.base import Owner
 
-__all__ = ["Boundary", "GraphInput", "GraphOutput"]
-
 T = TypeVar("T")
 
 

@@ -25,8 +25,6 @@ from hfg.ports import InnerSource, InnerTarget, OutputPort, Port, PortVector, So
 from hfg.ports.observable import RunObservable
 from hfg.types import accepts, describe, why_not
 
-__all__ = ["connect", "declare_edge", "refuse"]
-
 _SYNCHRONOUS: Final = ("output", "parameter")
 
 

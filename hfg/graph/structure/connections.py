@@ -9,8 +9,6 @@ from hfg import errors
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, end_path, is_single
 from hfg.graph.structure.sequence import Sequence
 
-__all__ = ["Connections"]
-
 
 class Connections:
     """Edges with an index, so that connecting the ten-thousandth is as fast as the first.

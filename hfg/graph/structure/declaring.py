@@ -22,18 +22,6 @@ from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort
 from hfg.types import describe, is_hint, why_not
 
-__all__ = [
-    "declare_group",
-    "move",
-    "need_new_port",
-    "promote",
-    "refuse_gate",
-    "refuse_promotion",
-    "refuse_standing",
-    "set_gate",
-    "stands_for",
-]
-
 
 def need_new_port(level: Level, kind: Literal["input", "output"], name: str, hint: object) -> None:
     """Refuse a port that cannot be, and any change of a running graph.

@@ -16,19 +16,6 @@ from hfg.graph.structure.options import EdgeOptions, Overflow
 from hfg.graph.structure.subgraph import iterated
 from hfg.ports import InnerSource, InnerTarget, Port, Source, Target
 
-__all__ = [
-    "Edge",
-    "PortEnd",
-    "SourceEnd",
-    "TargetEnd",
-    "end_path",
-    "is_feed",
-    "is_port",
-    "is_single",
-    "owner_of",
-    "type_of",
-]
-
 PortEnd: TypeAlias = Port | InnerSource[Any] | InnerTarget[Any]
 SourceEnd: TypeAlias = PortEnd | Observable[Any]  # that the direction is right is seen when an edge is declared
 TargetEnd: TypeAlias = PortEnd

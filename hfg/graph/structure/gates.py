@@ -8,8 +8,6 @@ import msgspec
 
 from hfg.nodetypes.node import Node
 
-__all__ = ["Gate", "Gates"]
-
 
 class Gate(msgspec.Struct, frozen=True, eq=False):
     """While `by` is inactive, `target` rests, or does `idle_rate_hz` firings a second."""

@@ -18,9 +18,6 @@ from hfg.graph.structure.option import declared, refuse_values, unknown
 from hfg.graph.structure.options import ACTIVE, PLAIN, PLAIN_NODE, EdgeOptions, GroupSpec, NodeOptions
 from hfg.graph.structure.retrying import error_names
 
-__all__ = ["edge_options", "group_spec", "node_options"]
-
-
 # --- edges ---
 
 

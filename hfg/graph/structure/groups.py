@@ -7,8 +7,6 @@ from typing import TypeAlias
 from hfg.errors import GraphError
 from hfg.graph.structure.options import GroupSpec
 
-__all__ = ["Groups", "GroupsState"]
-
 GroupsState: TypeAlias = tuple[dict[str, GroupSpec], set[str]]
 """All groups by name, and which of them were declared."""
 

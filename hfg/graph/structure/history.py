@@ -10,8 +10,6 @@ from typing import Final, Generic, TypeVar
 
 from hfg.errors import UsageError
 
-__all__ = ["MOST_STEPS", "History"]
-
 MOST_STEPS: Final = 1000
 """How many edits can be taken back; what was done before them is final. Each keeps 0.3 to 2 kB."""
 

@@ -11,8 +11,6 @@ import msgspec
 from hfg.graph.structure.option import declared
 from hfg.graph.structure.options import EdgeOptions
 
-__all__ = ["inner_part", "joined", "outer_part", "outermost"]
-
 _OTHER_BORDERS: Final = tuple(
     (name, one.option.border) for name, one in declared(EdgeOptions).items() if one.option.border != "outermost"
 )

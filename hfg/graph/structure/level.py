@@ -23,8 +23,6 @@ from hfg.graph.structure.subgraph import Box
 from hfg.nodetypes.node import Node
 from hfg.ports.base import Owner
 
-__all__ = ["HasLevel", "Level", "Whole", "inside", "level_of", "nodes_within"]
-
 
 class HasLevel(Owner, Protocol):
     """A graph, seen from below its face: `Graph` stands above all that works on levels."""

@@ -6,8 +6,6 @@ from hfg.graph.structure.sequence import Sequence
 from hfg.graph.structure.subgraph import Box, is_box
 from hfg.nodetypes.node import Node
 
-__all__ = ["Members"]
-
 
 class Members:
     """The nodes of one level.

@@ -12,8 +12,6 @@ from hfg.graph.structure.options import NodeOptions
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node, Place
 
-__all__ = ["close_box", "leave", "open_box", "place", "set_options", "settle", "write_parameter"]
-
 
 def settle(node: Node, level: Level, name: str, options: NodeOptions) -> None:
     """Let a node know that it is in a graph; all inside it follow."""

@@ -9,8 +9,6 @@ from hfg.base.controls import name_problem
 from hfg.errors import GraphError
 from hfg.nodetypes.node import Node
 
-__all__ = ["need_name", "path_of", "suggest"]
-
 
 def need_name(what: str, name: object) -> str:
     """Refuse what cannot be part of a path; `what` begins the message.

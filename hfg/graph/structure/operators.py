@@ -16,8 +16,6 @@ from typing_extensions import override
 from hfg.errors import DeclarationError, GraphError
 from hfg.nodetypes.description import look_up
 
-__all__ = ["NamedOperator", "OperatorFunction", "find_operator", "operator"]
-
 P = ParamSpec("P")
 Operator = Callable[[Observable[Any]], Observable[Any]]
 

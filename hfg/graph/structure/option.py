@@ -18,22 +18,6 @@ import msgspec
 from hfg.errors import HfgError
 from hfg.graph.structure.naming import suggest
 
-__all__ = [
-    "Border",
-    "Declared",
-    "Fields",
-    "Option",
-    "add_unset",
-    "declared",
-    "documented",
-    "explaining",
-    "given",
-    "having",
-    "refuse_values",
-    "unknown",
-    "written",
-]
-
 Border: TypeAlias = Literal["outermost", "every", "sum", "along", "target"]
 """What holds of an edge that leads through subgraphs, and so is made of several (rule G1).
 

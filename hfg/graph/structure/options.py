@@ -21,27 +21,6 @@ from typing_extensions import TypeVar
 from hfg.graph.structure.option import Fields, Option, documented
 from hfg.graph.structure.retrying import Errors
 
-__all__ = [
-    "ACTIVE",
-    "PLAIN",
-    "PLAIN_NODE",
-    "EdgeFields",
-    "EdgeGiven",
-    "EdgeOptions",
-    "Errors",
-    "GroupFields",
-    "GroupGiven",
-    "GroupSpec",
-    "NodeFields",
-    "NodeGiven",
-    "NodeOptions",
-    "OnError",
-    "Overflow",
-    "Policy",
-    "Release",
-    "in_group",
-]
-
 OnError: TypeAlias = Literal["stop", "skip", "disable", "restart"]
 Release: TypeAlias = Literal["auto", "sequential", "pipelined"]
 Overflow: TypeAlias = Literal["wait", "drop_oldest", "drop_newest", "latest", "error"]

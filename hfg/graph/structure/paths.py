@@ -13,20 +13,6 @@ from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, ParameterPort, Port
 
-__all__ = [
-    "candidates",
-    "find",
-    "inner_side",
-    "level_and_name",
-    "meant",
-    "node_at",
-    "parameter_at",
-    "same_port",
-    "source_at",
-    "split_inner",
-    "target_at",
-]
-
 
 def find(level: Level, path: str) -> Any:  # noqa: ANN401 - of a path type checkers know nothing
     """Follow a path to a node or, after a dot, to a port.

@@ -8,8 +8,6 @@ from hfg.graph.structure.options import NodeOptions, in_group
 from hfg.graph.structure.subgraph import iterated
 from hfg.nodetypes.node import Node
 
-__all__ = ["edge_place", "effective_options", "home_of", "is_attached", "is_in", "node_place", "side_of"]
-
 
 def node_place(node: Node) -> tuple[float, ...]:
     """Return the place of a node or subgraph in depth-first order of adding, for comparisons."""

@@ -7,8 +7,6 @@ from typing import Any
 
 from hfg.ports import ParameterPort
 
-__all__ = ["Promotions"]
-
 
 class Promotions:
     """The inner parameters that the parameters of one subgraph stand for.

@@ -18,8 +18,6 @@ from hfg.errors import GraphError, Problem
 from hfg.graph.structure.naming import path_of
 from hfg.nodetypes.node import Node
 
-__all__ = ["Refusable", "keep_refusals", "problem_of", "raise_refusals"]
-
 _kept: ContextVar[list[Problem] | None] = ContextVar("hfg.refusals", default=None)
 _OURS = str(Path(__file__).resolve().parents[2])
 

@@ -9,8 +9,6 @@ from typing import Any, TypeAlias
 
 from hfg.errors import GraphError
 
-__all__ = ["Errors", "error_names"]
-
 Errors: TypeAlias = "Iterable[type[Exception] | str] | type[Exception] | str"
 
 

@@ -11,8 +11,6 @@ from bisect import bisect_left
 from collections.abc import Iterable
 from typing import Generic, TypeVar
 
-__all__ = ["Sequence", "between"]
-
 T = TypeVar("T")
 
 

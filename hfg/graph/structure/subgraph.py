@@ -13,8 +13,6 @@ from hfg.graph.structure.promotions import Promotions
 from hfg.nodetypes.node import Node
 from hfg.ports import Relaying
 
-__all__ = ["Box", "Inside", "is_box", "is_unnamed", "iterated"]
-
 
 class Inside(Protocol):
     """The level inside a box, as far as the box needs it."""

@@ -18,8 +18,6 @@ from hfg.links.local.proof import CLAIM_SIZE, NONCE_SIZE, PROOF_SIZE, Caller, Li
 from hfg.links.local.wire import Frame, Inflow, frame
 from hfg.transport import Buffer
 
-__all__ = ["GREETS_S", "Incoming", "Outgoing", "greet", "introduce"]
-
 GREETS_S: Final = 2.0
 """How long the other end may take to prove who it is."""
 

@@ -19,8 +19,6 @@ from hfg.base.private import MACHINE, state_folder
 from hfg.base.sockets import SocketFolder
 from hfg.errors import TransportError
 
-__all__ = ["NAME_SIZE", "Place", "user_folder"]
-
 NAME_SIZE: Final = 8
 """Bytes of the name of a session."""
 

@@ -16,8 +16,6 @@ import secrets
 import struct
 from typing import Final
 
-__all__ = ["CLAIM_SIZE", "NONCE_SIZE", "PROOF_SIZE", "TAG_SIZE", "Caller", "Listener", "Refused", "Seals"]
-
 NONCE_SIZE: Final = 32
 PROOF_SIZE: Final = 32
 TAG_SIZE: Final = 16

@@ -26,8 +26,6 @@ from hfg.links.local.proof import Caller, Listener, Refused
 from hfg.links.local.wire import LONGEST_HEADER, LONGEST_KEY, Frame, Kind
 from hfg.transport import Answer, Buffer, Message, Presence, Receive, Traffic, Watch, size_of
 
-__all__ = ["LocalPublisher", "LocalSession", "LocalTransport", "transport"]
-
 _OPENS_S: Final = 1.0  # how long opening waits for neighbours that stand still
 _CLOSES_S: Final = 1.0  # how long closing waits for neighbours that do not read
 _AGAIN_S: Final = 0.02

@@ -16,8 +16,6 @@ from typing import Final, NamedTuple
 from hfg.links.local.proof import TAG_SIZE, Refused, Seals
 from hfg.transport import Buffer, size_of
 
-__all__ = ["CHUNK", "LONG", "LONGEST_HEADER", "LONGEST_KEY", "Frame", "Inflow", "Kind", "frame"]
-
 _HEAD: Final = struct.Struct("<BHII")  # kind, and bytes of the key, the header and the payload, which follow
 LONG: Final = 2**18
 """A payload with more bytes gets a buffer of its own, which nobody copies."""

@@ -14,8 +14,6 @@ from hfg.encoding import TokenCodec
 from hfg.links.offers import Seen, introduce, read_introduction, read_name
 from hfg.transport import Presence, Session
 
-__all__ = ["MOST", "End"]
-
 MOST: Final = 1_000
 """Publishers of one name, consumers of one publisher, and sentences about them, that are taken note of."""
 

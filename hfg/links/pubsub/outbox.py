@@ -14,8 +14,6 @@ from typing import NamedTuple
 
 from hfg.errors import RunError
 
-__all__ = ["KeptValue", "OutboxFile"]
-
 
 class KeptValue(NamedTuple):
     """A value that was published and may not be done.

@@ -22,8 +22,6 @@ from hfg.links.pubsub.returning import Returning, identity_of
 from hfg.links.running import BoundedSender, LinkSender
 from hfg.transport import Closing, EncodedToken, Presence, Session
 
-__all__ = ["Absent", "Publication", "PublicationCounts"]
-
 Absent: TypeAlias = Literal["pass", "wait"]
 
 

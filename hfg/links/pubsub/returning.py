@@ -8,8 +8,6 @@ from typing import Final
 
 from hfg.links.running import LinkSender
 
-__all__ = ["Returning", "identity_of"]
-
 _PLACE: Final = "(before)"
 _IN_S: Final = 3.0  # once one of them is back: the lease of a connection, and some more
 

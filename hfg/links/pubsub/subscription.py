@@ -18,8 +18,6 @@ from hfg.links.pubsub.end import MOST, End
 from hfg.links.running import BoundedReceiver, LinkReceiver
 from hfg.transport import Closing, LinkOverflow, Presence, Session
 
-__all__ = ["Subscription", "SubscriptionCounts"]
-
 _ANSWER_S: Final = 2.0  # how long a publisher may take to answer
 
 

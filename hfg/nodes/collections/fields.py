@@ -12,8 +12,6 @@ from typing import Any
 
 import msgspec
 
-__all__ = ["read_field", "record_fields"]
-
 
 def read_field(value: Any, path: str) -> Any:
     """Follow a path such as "pose.x" or "points.0.x" into a value; an empty one is the value itself.

@@ -15,36 +15,6 @@ from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Output, Parameter, State, slot
 
-__all__ = [
-    "CollectItems",
-    "EachItem",
-    "ShuffleItems",
-    "append_item",
-    "build_list",
-    "chunk_items",
-    "combine_lists",
-    "contains_item",
-    "count_item",
-    "enumerate_items",
-    "filter_items",
-    "flatten",
-    "group_by",
-    "index_of",
-    "max_by",
-    "merge_lists",
-    "min_by",
-    "pluck",
-    "repeat_item",
-    "reverse_items",
-    "select_item",
-    "size",
-    "slice_items",
-    "sort_items",
-    "unique_items",
-    "windows",
-    "zip_lists",
-]
-
 T = TypeVar("T")
 
 

@@ -12,27 +12,6 @@ from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Output, Outputs, Parameter, State, slot
 
-__all__ = [
-    "Compose",
-    "ComposeDict",
-    "Decompose",
-    "DecomposeDict",
-    "MapLookup",
-    "dict_of_pairs",
-    "get_field",
-    "key_value",
-    "keys_of",
-    "merge_dicts",
-    "need_keys",
-    "pairs_of",
-    "parts_of",
-    "pick_keys",
-    "rename_keys",
-    "set_key",
-    "values_of",
-    "without_keys",
-]
-
 MapOrFunction: TypeAlias = Mapping[Any, Any] | Callable[[Any], Any]
 
 

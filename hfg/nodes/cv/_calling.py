@@ -19,8 +19,6 @@ from hfg.nodes.cv._overrides import Say
 from hfg.nodes.cv._room import copy_with_room, with_room
 from hfg.types import describe_value
 
-__all__ = ["Calling", "Inlet", "Knob"]
-
 _FARTHEST: Final = 32767
 """Coordinates beyond this are refused: OpenCV draws with numbers of 16 bits and would count for minutes."""
 

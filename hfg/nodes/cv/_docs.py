@@ -6,8 +6,6 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-__all__ = ["Documentation", "read"]
-
 _SIGNATURE = re.compile(r"^\w+\((.*?)\) -> (.+)$")
 _TAG = re.compile(
     r"^@(brief|param|return|returns|note|sa|see|overload|code|endcode|snippet|include)\b\s*", re.MULTILINE

@@ -24,8 +24,6 @@ from hfg.nodes.cv._stub import enumerations
 from hfg.ports.specs import REQUIRED
 from hfg.types import Named, Pixels, Shape
 
-__all__ = ["COMMON", "FUNCTIONS", "NEEDS", "Need", "Say"]
-
 Convert: TypeAlias = Callable[[Any, Mapping[str, Any]], Any]
 """Turns the value of a port into OpenCV's argument; it sees the inputs by name."""
 

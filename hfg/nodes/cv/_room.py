@@ -12,8 +12,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.lib.array_utils import byte_bounds
 
-__all__ = ["copy_with_room", "with_room"]
-
 _BEFORE: Final = 16
 """Bytes; what the C library itself keeps before each block of memory."""
 _BEHIND: Final = 64

@@ -14,8 +14,6 @@ from typing import NamedTuple
 
 import cv2
 
-__all__ = ["Argument", "Overload", "enumerations", "overloads"]
-
 _FUNCTION = re.compile(r"^def (\w+)\((.*)\) -> (.+): \.\.\.$", re.MULTILINE)
 _ENUMERATION = re.compile(r'^(\w+) = int\n"""One of \[(.*)\]"""$', re.MULTILINE)
 

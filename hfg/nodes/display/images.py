@@ -19,8 +19,6 @@ from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Parameter, State
 
-__all__ = ["ImageDisplay", "image_grid", "visible"]
-
 
 class ImageDisplay(Node):
     """Show the newest image in a file, which a viewer that looks after it, or a browser, shows to people.

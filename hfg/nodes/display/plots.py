@@ -20,8 +20,6 @@ from hfg.nodes.values.vectors import Vector
 from hfg.nodetypes.node import Node
 from hfg.ports import Input, Inputs, Output, Parameter, State, slot
 
-__all__ = ["HistogramPlot", "ScatterPlot", "TimePlot", "VectorPlot", "finite"]
-
 Numbers: TypeAlias = float | Vector
 """One number, or several: a list of them or an array with one axis."""
 

@@ -15,8 +15,6 @@ from hfg.panels import Look, Scene, view
 from hfg.ports import Input
 from hfg.types import accepts
 
-__all__ = ["Show"]
-
 _LETTERS: Final = 44
 _LINES: Final = 10
 

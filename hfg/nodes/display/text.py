@@ -20,8 +20,6 @@ from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Parameter, State, slot
 
-__all__ = ["Indicator", "SignalLight", "TextDisplay", "format_table", "log_value", "print_line"]
-
 Level: TypeAlias = Literal["debug", "info", "warning", "error"]
 
 _LEVELS: Final[dict[str, int]] = {

@@ -17,8 +17,6 @@ from typing import IO, Any, AnyStr, BinaryIO, Final, Literal, TypeAlias
 from hfg.base import whole
 from hfg.base.bounds import FILE_BYTES
 
-__all__ = ["FilePath", "find_files", "is_a_path", "lines_of", "named", "reaching", "read_whole", "write_whole"]
-
 FilePath: TypeAlias = str | Path
 """Where a file is; relative paths start in the working directory of the program."""
 

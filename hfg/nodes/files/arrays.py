@@ -14,8 +14,6 @@ import numpy as np
 
 from hfg.base.bounds import FILE_BYTES
 
-__all__ = ["need_fair_arrays"]
-
 
 def need_fair_arrays(path: Path, *, is_zip: bool, whole: bool) -> None:
     """Refuse a file whose arrays are not there, or are more than may be read.

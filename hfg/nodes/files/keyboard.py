@@ -17,8 +17,6 @@ from typing import Final
 
 from hfg.errors import UsageError
 
-__all__ = ["lines_of_standard_input"]
-
 _AT_ONCE: Final = 65536
 
 

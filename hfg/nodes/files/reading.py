@@ -23,22 +23,6 @@ from hfg.nodes.files.arrays import need_fair_arrays
 from hfg.nodetypes.functions import node
 from hfg.types import Array
 
-__all__ = [
-    "json_of",
-    "list_directory",
-    "load_array",
-    "load_image",
-    "read_array",
-    "read_arrays",
-    "read_bytes",
-    "read_csv",
-    "read_image",
-    "read_json",
-    "read_raw_image",
-    "read_text",
-    "rows_of",
-]
-
 Column: TypeAlias = Literal["text", "int", "float", "bool"]
 Encoding: TypeAlias = Literal["utf-8", "utf-8-sig", "latin-1", "ascii", "utf-16", "cp1252"]
 Delimiter: TypeAlias = Annotated[str, MinLen(1), MaxLen(1)]

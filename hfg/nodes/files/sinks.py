@@ -30,21 +30,6 @@ from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, State
 from hfg.types import Array
 
-__all__ = [
-    "StackArrays",
-    "StandardOutput",
-    "WriteArray",
-    "WriteArrays",
-    "WriteBytes",
-    "WriteCsv",
-    "WriteImage",
-    "WriteJson",
-    "WriteJsonLines",
-    "WriteLines",
-    "WriteText",
-    "encoded",
-]
-
 PICTURES: Final = "*.png *.jpg *.jpeg *.tif *.tiff *.bmp *.webp *.exr *.hdr *.pgm *.ppm"
 _ENCODINGS: Final = ("utf-8", "utf-8-sig", "latin-1", "ascii", "utf-16", "cp1252")
 

@@ -21,8 +21,6 @@ from hfg.nodetypes.node import Node
 from hfg.ports import Event, Output, Parameter, State, slot
 from hfg.types import Array
 
-__all__ = ["ArrayRows", "CsvRows", "FilePaths", "ImageFiles", "JsonLines", "StandardInput", "TextLines"]
-
 _ENCODINGS: Final = ("utf-8", "utf-8-sig", "latin-1", "ascii", "utf-16", "cp1252")
 
 

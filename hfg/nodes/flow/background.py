@@ -11,8 +11,6 @@ from hfg.base.token import Token
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Parameter, State
 
-__all__ = ["Background"]
-
 
 class Background(Node):
     """Work on every value in a task of its own, concurrently with the stream: derive from it and override `work`.

@@ -13,8 +13,6 @@ from hfg.nodes._rounding import slack_s
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State
 
-__all__ = ["Accumulate", "Count", "CountItems", "Recent", "TimeWindow", "Window"]
-
 
 class Count(Node):
     """Count the values of a stream.

@@ -12,8 +12,6 @@ from hfg.nodes._rounding import slack_s
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
 
-__all__ = ["CombineLatest", "Join", "JoinByStamp", "SampleAndHold", "Synchronizer"]
-
 
 class Join(Node):
     """Let several streams continue together: a barrier.

@@ -17,8 +17,6 @@ from hfg.graph.structure.level import level_of
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 
-__all__ = ["Cache", "HoldableBuffer", "Latch", "MemoryCell", "TriggeredLatch"]
-
 
 class Latch(Node):
     """Keep the newest value and send it again and again: a source.

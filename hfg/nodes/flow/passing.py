@@ -14,20 +14,6 @@ from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 
-__all__ = [
-    "AtEnd",
-    "Different",
-    "Distinct",
-    "EveryNth",
-    "MarkerDetector",
-    "MessageEvent",
-    "ProcessSignal",
-    "Skip",
-    "Take",
-    "TakeWhile",
-    "relay",
-]
-
 T = TypeVar("T")
 
 

@@ -9,8 +9,6 @@ from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Output, Outputs, Parameter, Slots, slot
 
-__all__ = ["Demux", "Gate", "Merge", "Mux", "Rejoin", "switch"]
-
 T = TypeVar("T")
 
 

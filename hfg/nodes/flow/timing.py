@@ -14,8 +14,6 @@ from hfg.nodes._alarm import Alarm
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 
-__all__ = ["Debounce", "Delay", "Throttle"]
-
 _ROUNDING: Final = 1e-6
 """Of a period: a moment this close before a period is in it, for sums of floats fall short of it now and then."""
 

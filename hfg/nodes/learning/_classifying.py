@@ -16,8 +16,6 @@ from hfg.nodes.learning._samples import Sample
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 
-__all__ = ["Classifier"]
-
 
 class Classifier(Node):
     """Say which class samples belong to, by a model that a trainer has written.

@@ -15,8 +15,6 @@ from hfg.nodes import _structured
 from hfg.nodes._structured import need_harmless, trust
 from hfg.nodes.learning._samples import Sample
 
-__all__ = ["model_of", "table_of", "text_of"]
-
 _MOST: Final = 1e30  # OpenCV takes larger numbers for missing ones
 
 

@@ -14,8 +14,6 @@ from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Outputs, Parameter, State
 
-__all__ = ["FunctionSamples", "Sample", "SampleSplitter", "filter_samples", "label_samples", "make_sample"]
-
 T = TypeVar("T")
 
 

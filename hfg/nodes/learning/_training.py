@@ -16,8 +16,6 @@ from hfg.nodes.learning._samples import Sample
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Parameter, State, slot
 
-__all__ = ["NearestTrainer", "RandomTreesTrainer", "SvmTrainer"]
-
 
 class _Trainer(Node):
     """Collects samples; what it learns from them is up to those who derive from it."""

@@ -16,8 +16,6 @@ from annotated_types import Interval
 from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, State, slot
 
-__all__ = ["Landmark", "LandmarkMap", "LandmarkMixture"]
-
 
 class Landmark(NamedTuple):
     """Something with a label, in the map.

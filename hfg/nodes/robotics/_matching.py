@@ -12,8 +12,6 @@ from hfg.nodes.robotics._scans import Pose, Positions, Segments
 from hfg.nodetypes.functions import node
 from hfg.types import Named, Shape
 
-__all__ = ["Covariance", "ScanMatch", "match_scan", "moved"]
-
 Covariance: TypeAlias = Annotated[npt.NDArray[np.float64], Shape(3, 3), Named("Covariance")]
 """How sure a pose is: of x, y in metres and the heading in radians."""
 

@@ -13,8 +13,6 @@ from hfg.nodes.robotics._scans import Positions
 from hfg.nodetypes.functions import node
 from hfg.types import Named, Shape
 
-__all__ = ["Costs", "Place", "plan_path"]
-
 Costs: TypeAlias = Annotated[npt.NDArray[np.float64], Shape(None, None), Named("Costs")]
 """What it costs to cross each cell of a grid, for each metre; rows go along x, columns along y."""
 

@@ -12,20 +12,6 @@ from annotated_types import Interval, Unit
 from hfg.nodetypes.functions import node
 from hfg.types import Named, Shape
 
-__all__ = [
-    "Disk",
-    "Pose",
-    "Positions",
-    "Ranges",
-    "Segments",
-    "expected_ranges",
-    "find_disks",
-    "nearest_obstacle",
-    "need_pairs",
-    "scan_points",
-    "seen_from",
-]
-
 Ranges: TypeAlias = Annotated[npt.NDArray[np.float64], Shape(None), Named("Ranges")]
 """One number for each beam of a laser."""
 

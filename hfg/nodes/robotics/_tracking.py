@@ -13,8 +13,6 @@ from hfg.nodes.robotics._scans import Disk, Pose, Ranges, need_pairs
 from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, State
 
-__all__ = ["DiskTracks", "TrackDisks"]
-
 _JUMP = 0.3  # metres: what is farther from where a disk should be is another one
 _GAIN, _SPEED_GAIN = 0.7, 0.25  # of the alpha-beta filter
 _STILL = 0.05  # m/s: a standing thing is never measured as quite still

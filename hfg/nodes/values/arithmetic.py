@@ -11,34 +11,6 @@ from annotated_types import Interval, Unit
 from hfg.nodetypes.functions import node
 from hfg.ports import Inputs
 
-__all__ = [
-    "absolute",
-    "add",
-    "arithmetic",
-    "bitwise",
-    "clamp",
-    "deadband",
-    "degrees_of",
-    "divide",
-    "function_of",
-    "invert",
-    "largest",
-    "map_range",
-    "mean_of",
-    "modulo",
-    "multiply",
-    "negate",
-    "power",
-    "product_of",
-    "radians_of",
-    "round_to",
-    "scale",
-    "smallest",
-    "subtract",
-    "sum_of",
-    "wrap_angle",
-]
-
 
 @node
 def add(a: float, b: float) -> float:

@@ -19,26 +19,6 @@ from hfg.ports import Event, Output, Parameter, State, slot
 from hfg.ports.events import EventPort
 from hfg.types import Shape
 
-__all__ = [
-    "BoolOnTrigger",
-    "ColourOnTrigger",
-    "ConstantBool",
-    "ConstantColour",
-    "ConstantFloat",
-    "ConstantInt",
-    "ConstantMatrix",
-    "ConstantText",
-    "ConstantVector",
-    "FloatOnTrigger",
-    "IntOnTrigger",
-    "MatrixOnTrigger",
-    "TextOnTrigger",
-    "VectorOnTrigger",
-    "as_array",
-    "has_floats",
-    "replace_by",
-]
-
 T = TypeVar("T")
 
 VectorArray: TypeAlias = Annotated[npt.NDArray[np.float64], Shape(None)]

@@ -17,8 +17,6 @@ from annotated_types import MaxLen, Predicate
 from hfg.nodetypes.functions import node
 from hfg.ports import Inputs, Parameter
 
-__all__ = ["expression", "is_a_formula", "read_formula"]
-
 Calculation: TypeAlias = Callable[[Sequence[float]], float]
 
 _NAMES: Final = "abcdefghijklmnopqrstuvwxyz"

@@ -16,22 +16,6 @@ from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, State
 
-__all__ = [
-    "AddNoise",
-    "FloatRange",
-    "IntRange",
-    "LinearSpace",
-    "ListSource",
-    "RandomBool",
-    "RandomChoice",
-    "RandomInt",
-    "RandomNormal",
-    "RandomUniform",
-    "is_a_number",
-    "is_not_zero",
-    "waveform",
-]
-
 T = TypeVar("T")
 
 

@@ -18,23 +18,6 @@ from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter
 
-__all__ = [
-    "ParseBool",
-    "ParseFloat",
-    "ParseInt",
-    "ParseJson",
-    "decode_text",
-    "encode_text",
-    "json_bytes",
-    "plain",
-    "to_bool",
-    "to_float",
-    "to_int",
-    "to_json",
-    "to_text",
-    "type_name",
-]
-
 
 class ParseInt(Node):
     """Read whole numbers; other texts are silent and signalled.

@@ -16,22 +16,6 @@ from hfg.base.token import Token
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 
-__all__ = [
-    "PID",
-    "CumulativeSum",
-    "Derivative",
-    "Difference",
-    "ExponentialSmoothing",
-    "Extremes",
-    "Histogram",
-    "Integral",
-    "LowPass",
-    "MovingAverage",
-    "MovingMedian",
-    "Statistics",
-    "WindowStatistics",
-]
-
 
 class Statistics(Node):
     """Send the mean and the spread of all numbers so far.

@@ -18,33 +18,6 @@ from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Parameter
 
-__all__ = [
-    "Found",
-    "TextCompare",
-    "change_case",
-    "contains_text",
-    "count_in_text",
-    "find_all",
-    "format_fields",
-    "format_safely",
-    "format_text",
-    "is_a_format",
-    "is_a_pattern",
-    "join_list",
-    "join_text",
-    "matches_text",
-    "pad_text",
-    "replace_pattern",
-    "replace_text",
-    "search_text",
-    "slice_text",
-    "split_lines",
-    "split_text",
-    "strip_text",
-    "text_length",
-]
-
-
 # --- joining and parting ---
 
 

@@ -17,18 +17,6 @@ from hfg.nodetypes.node import Node
 from hfg.ports import Input, Inputs, Output, Parameter, State
 from hfg.types import Shape
 
-__all__ = [
-    "AddNoiseToVector",
-    "Extremum",
-    "add_vectors",
-    "dot",
-    "extremum",
-    "norm",
-    "normalize",
-    "scale_vector",
-    "summarize",
-]
-
 VectorArray: TypeAlias = Annotated[npt.NDArray[np.float64], Shape(None)]
 Vector: TypeAlias = Sequence[float] | Annotated[npt.NDArray[np.floating[Any] | np.integer[Any]], Shape(None)]
 """A list or tuple of numbers, or an array with one axis."""

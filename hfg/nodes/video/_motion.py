@@ -16,15 +16,6 @@ from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 from hfg.types import Named
 
-__all__ = [
-    "BackgroundSubtractor",
-    "FrameDifference",
-    "ObjectTracker",
-    "OpticalFlow",
-    "PointTracker",
-    "RunningMean",
-]
-
 _LEAST_OBJECT: Final = 32
 """Pixels: in one of fewer, OpenCV draws features at random, for ever if none has room (measured up to 16)."""
 

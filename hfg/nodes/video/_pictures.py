@@ -17,8 +17,6 @@ from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Parameter, slot
 
-__all__ = ["Screenshot", "collage"]
-
 _FARTHEST = 32767
 
 

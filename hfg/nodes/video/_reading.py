@@ -26,8 +26,6 @@ from hfg.nodes.files.access import find_files
 from hfg.nodetypes.node import Node
 from hfg.ports import Output, Parameter, State
 
-__all__ = ["Camera", "VideoFile"]
-
 
 class _Capture:
     """An open video or camera that one thread at a time reads."""

@@ -22,8 +22,6 @@ from hfg.nodes.files.access import reaching
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Parameter, State, slot
 
-__all__ = ["WriteVideo"]
-
 _LEAST_BYTES: Final = 64 * 1024
 """More than OpenCV holds back, so that what it could not write would not fit now either."""
 

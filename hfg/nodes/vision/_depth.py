@@ -17,8 +17,6 @@ from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 from hfg.types import Named
 
-__all__ = ["Calibration", "CameraCalibration", "StereoDepth"]
-
 Corners = Annotated[npt.NDArray[np.float32], Rows(2), Named("Corners")]
 
 

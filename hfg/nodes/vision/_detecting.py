@@ -20,8 +20,6 @@ from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State
 from hfg.types import Named
 
-__all__ = ["BarcodeReader", "CascadeDetector", "ChessboardFinder", "MarkerDetector", "PeopleDetector", "qr_code"]
-
 Box = tuple[int, int, int, int]
 Corners = Annotated[npt.NDArray[np.float32], Rows(2), Named("Corners")]
 

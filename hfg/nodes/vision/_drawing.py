@@ -15,8 +15,6 @@ from hfg.images import Color, Picture, wrong_image
 from hfg.nodes._pictures import colour
 from hfg.nodetypes.functions import node
 
-__all__ = ["Circles", "draw_boxes", "draw_circles"]
-
 Box = tuple[int, int, int, int]
 _FARTHEST: Final = 32767  # OpenCV draws with 16 bits before the point
 

@@ -10,8 +10,6 @@ from hfg.nodes._pictures import colour, gray, need_picture
 from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter
 
-__all__ = ["EqualizeLocally"]
-
 
 class EqualizeLocally(Node):
     """Spread the brightness of each region over the whole range (CLAHE).

@@ -16,8 +16,6 @@ from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, State
 from hfg.types import Named, Shape
 
-__all__ = ["KeypointDetector", "match_descriptors"]
-
 Descriptors = Annotated[npt.NDArray[np.uint8 | np.float32], Shape(None, None), Named("Descriptors")]
 Places = Annotated[npt.NDArray[np.float32], Shape(None, 2), Named("Places")]
 

@@ -21,8 +21,6 @@ from hfg.nodes._pictures import gray
 from hfg.nodetypes.functions import node
 from hfg.types import Named
 
-__all__ = ["Bullseye", "find_bullseyes", "find_quadrilaterals"]
-
 Corners = Annotated[npt.NDArray[np.float32], Rows(2), Named("Corners")]
 _Points = npt.NDArray[np.float64]
 

@@ -21,8 +21,6 @@ from hfg.parts.hosts.requests import serve
 from hfg.parts.processes.peer_process import Launched
 from hfg.transport import Closing, Session
 
-__all__ = ["WAITS_S", "Agent", "Computer"]
-
 _LOGGER = Log("hfg.agent")
 
 WAITS_S: Final = 10.0

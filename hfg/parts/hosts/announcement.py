@@ -21,8 +21,6 @@ from hfg.parts.hosts.realm import RunIs, run_id, run_place
 from hfg.parts.hosts.requests import serve
 from hfg.transport import Session
 
-__all__ = ["Announcement"]
-
 
 class Announcement:
     """Announces a run and answers for it, until it is closed."""

@@ -28,8 +28,6 @@ from hfg.parts.processes.standby import Standby
 from hfg.parts.running.rings import sweep_run
 from hfg.transport import Session
 
-__all__ = ["Deployed", "Journal", "ThisComputer", "is_importable", "logs_folder"]
-
 _LONGEST_LINE: Final = 64 * 1024
 _LONGEST_LOG: Final = 16 * 2**20
 _LONGEST_CHUNK: Final = 256 * 1024

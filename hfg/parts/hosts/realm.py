@@ -22,21 +22,6 @@ from hfg.base.logs import Log
 from hfg.errors import TransportError
 from hfg.transport import Presence, Session
 
-__all__ = [
-    "AGENTS",
-    "FINDS_S",
-    "GONE_S",
-    "RUNS",
-    "AgentIs",
-    "Realm",
-    "RunIs",
-    "agent_place",
-    "myself",
-    "named",
-    "run_id",
-    "run_place",
-]
-
 _LOGGER = Log("hfg.parts")
 
 AGENTS: Final = "agents"

@@ -24,8 +24,6 @@ from hfg.parts.hosts.requests import Request, ask
 from hfg.parts.processes.peer_process import Launched, Launcher
 from hfg.transport import Session
 
-__all__ = ["AgentLauncher", "deployed_as"]
-
 _LOGGER = Log("hfg.parts")
 _STARTS_S: Final = 20.0  # an agent may have to end a previous incarnation first
 _ENDS_S: Final = 8.0

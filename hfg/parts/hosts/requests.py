@@ -15,31 +15,6 @@ from hfg.base.controls import cleaned
 from hfg.errors import TransportError, UsageError
 from hfg.transport import Closing, Session
 
-__all__ = [
-    "Begins",
-    "Check",
-    "Chunk",
-    "Deploy",
-    "Done",
-    "End",
-    "Gone",
-    "Look",
-    "Missing",
-    "PartIs",
-    "Parts",
-    "PartsAre",
-    "ReadLog",
-    "Request",
-    "Restart",
-    "Seen",
-    "Start",
-    "Started",
-    "Stop",
-    "Wait",
-    "ask",
-    "serve",
-]
-
 Answer = TypeVar("Answer")
 
 

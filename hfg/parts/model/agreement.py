@@ -20,8 +20,6 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import msgspec
 
-__all__ = ["Account", "Agreement", "Answer", "Counted", "Question", "Rest", "Step"]
-
 Step: TypeAlias = Literal[
     "missing", "lose", "rests", "fullest", "grow", "held", "give_up", "complete", "end", "stuck", "finish"
 ]

@@ -17,8 +17,6 @@ from typing import Final, NamedTuple
 
 import msgspec
 
-__all__ = ["DRIFT", "Offset", "RunClock", "machine"]
-
 DRIFT: Final = 1e-4
 """How fast two quartz clocks may part at most, in seconds a second; they are specified to half of it."""
 

@@ -17,8 +17,6 @@ import msgspec
 from hfg.graph.flat import LINK, MAIN, ROOT, CutEdge, Cutting, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.graph.flat.order import strongly_connected
 
-__all__ = ["Component", "Cost", "components", "is_numbered", "is_synchronous"]
-
 Cost: TypeAlias = Literal["nothing", "taken", "unknown"]
 """Cost of a death: nothing; the tokens that were taken and not passed on; or an unknown number of tokens."""
 

@@ -13,8 +13,6 @@ from hfg.graph.flat import LINK, ROOT, Cutting, FlatGraph, FlatNode, cut, flatte
 from hfg.parts.model.components import components
 from hfg.parts.model.inheriting import keeping
 
-__all__ = ["costs_of_deaths", "uncounted"]
-
 
 def costs_of_deaths(graph: Graph) -> Iterator[Problem]:
     """Say for each connected part of each group with a process what a death costs, and what would avoid that."""

@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
-__all__ = ["LIMIT", "WITHIN_S", "Deaths"]
-
 LIMIT: Final = 5
 """How often a part may die within a minute and be restarted."""
 

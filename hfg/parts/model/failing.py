@@ -21,8 +21,6 @@ from hfg.errors import EncodingError, Failure, HfgError, NodeError, RunError
 from hfg.parts.model.messages import Failed
 from hfg.ports import Port
 
-__all__ = ["as_error", "as_failed", "codec_of"]
-
 
 def as_failed(error: BaseException | None) -> Failed | None:
     """Put what went wrong into words."""

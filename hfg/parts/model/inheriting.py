@@ -17,18 +17,6 @@ from hfg.graph.flat import LINK, MAIN, Cutting, End, FlatGraph
 from hfg.graph.flat.order import strongly_connected
 from hfg.parts.model.components import Component, components
 
-__all__ = [
-    "UNKNOWN",
-    "Alignment",
-    "Arrived",
-    "Inheritance",
-    "Where",
-    "inherited",
-    "inheriting",
-    "keeping",
-    "remembered",
-]
-
 Where: TypeAlias = tuple[int, int]
 """The position of a token: stream and number. On an edge from an output, numbers grow by one in all incarnations."""
 

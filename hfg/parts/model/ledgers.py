@@ -11,8 +11,6 @@ from typing import NamedTuple
 
 from hfg.errors import RunError
 
-__all__ = ["Entry", "Ledger", "LedgerFile", "ledger_of"]
-
 
 class Entry(NamedTuple):
     """The stored data of a part.

@@ -41,44 +41,6 @@ from hfg.trace import (
 )
 from hfg.transport import Buffer
 
-__all__ = [
-    "KINDS",
-    "Ask",
-    "AskTime",
-    "Begin",
-    "Call",
-    "Close",
-    "Closed",
-    "Ended",
-    "Failed",
-    "Finish",
-    "GoesOn",
-    "Hears",
-    "Joins",
-    "Keep",
-    "Kept",
-    "Logged",
-    "Message",
-    "OfAnEdge",
-    "Open",
-    "Opened",
-    "Parcel",
-    "Passed",
-    "Reborn",
-    "Rests",
-    "Result",
-    "Seen",
-    "Sees",
-    "Shares",
-    "Speaks",
-    "TellTime",
-    "Told",
-    "Untrue",
-    "pack",
-    "unpack",
-]
-
-
 Outcome: TypeAlias = Annotated[str, msgspec.Meta(pattern="^(done|failed|stalled|stopped|aborted|cancelled|until)$")]
 """How a run ends; see `Report`."""
 

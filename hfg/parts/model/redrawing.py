@@ -16,8 +16,6 @@ from hfg.graph.editing.changes import Change, ParameterChange
 from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatEdge, FlatGraph, FlatNode
 from hfg.parts.model.inheriting import inheriting, keeping
 
-__all__ = ["Concern", "concerned"]
-
 
 class Concern(NamedTuple):
     """The part that an edit concerns.

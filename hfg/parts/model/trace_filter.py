@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterable
 from hfg.graph.flat import CutEdge
 from hfg.trace import TokenProcessed, TokenSent, TokenTaken, TraceEvent
 
-__all__ = ["trace_filter"]
-
 
 def trace_filter(part: str, edges: Iterable[CutEdge]) -> Callable[[TraceEvent], bool]:
     """Return a filter for the trace events that a part reports; each edge between two parts is in both.

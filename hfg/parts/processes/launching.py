@@ -28,17 +28,6 @@ from hfg.parts.running.channels import name_of
 from hfg.parts.transports import open_sessions, transport
 from hfg.transport import Buffer, Session
 
-__all__ = [
-    "BEAT_S",
-    "STARTS_S",
-    "Instructions",
-    "LoopLauncher",
-    "PartProcess",
-    "ProcessLauncher",
-    "beat_of",
-    "build_graph",
-]
-
 BEAT_S: Final = 0.5
 """How often a process reports that its event loop is running."""
 

@@ -15,8 +15,6 @@ from hfg.parts.model.messages import Begin, Closed, Message
 from hfg.parts.running.channels import Channel
 from hfg.transport import Session
 
-__all__ = ["Launched", "Launcher", "PeerProcess"]
-
 
 class Launched(Protocol):
     """One other part, wherever it runs.

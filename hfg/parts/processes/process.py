@@ -35,8 +35,6 @@ from hfg.parts.processes.worker import Worker
 from hfg.parts.transports import open_sessions
 from hfg.transport import Session, Traffic
 
-__all__ = ["main"]
-
 _LONGEST: Final = 2**20
 _PATIENCE_S: Final = 7.0
 

@@ -25,8 +25,6 @@ from hfg.parts.model.clocks import machine
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["Rendezvous", "remove"]
-
 _MACHINE: Final = hashlib.blake2b(machine().encode(), digest_size=4).hexdigest()
 _PREFIX: Final = f"hfg-meet-{_MACHINE}-"  # a lock may belong to one machine, and the directory to several
 _NAME: Final = re.compile(re.escape(_PREFIX) + r"[a-z0-9_]{8}")

@@ -14,8 +14,6 @@ from asyncio.subprocess import PIPE, STDOUT, Process
 from pathlib import Path
 from typing import Final
 
-__all__ = ["PROCESS", "STANDBY", "Standby", "start"]
-
 PROCESS: Final = "hfg.parts.processes.process"
 """The module that serves a part."""
 

@@ -39,8 +39,6 @@ from hfg.parts.running.rings import sweep_run
 from hfg.parts.steering.serving import Serving
 from hfg.transport import Session
 
-__all__ = ["FIRST_INCARNATION", "Worker"]
-
 _LOGGER = Log("hfg.parts")
 FIRST_INCARNATION = 1
 _MOST_RECORDS = 1000  # waiting to be sent

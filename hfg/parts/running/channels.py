@@ -15,8 +15,6 @@ from hfg.links.running import LinkReceiver, LinkSender
 from hfg.parts.model.messages import Message, Untrue, pack, unpack
 from hfg.transport import Session
 
-__all__ = ["Channel", "called", "name_of"]
-
 _LOGGER = Log("hfg.parts")
 _WINDOW: Final = 64  # messages in transit
 _MAIN: Final = "main"  # name of the part without a name, in keys

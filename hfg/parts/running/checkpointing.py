@@ -34,8 +34,6 @@ from hfg.ports import Port
 from hfg.ports.edges import AnyEdge, EventEdge
 from hfg.transport import Position
 
-__all__ = ["Checkpointer", "KeptEdge", "KeptOutbox", "Leaving", "Snapshot", "read"]
-
 _BYTES_PER_S: Final = 10_000_000  # how much is kept at most: large state is kept less often
 _VERSION: Final = 1
 

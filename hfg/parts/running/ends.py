@@ -30,8 +30,6 @@ from hfg.parts.running.rings import Borrowing, Lending, segment_of
 from hfg.ports.outputs import OutputPort
 from hfg.transport import Delivery, EncodedToken, Position, Session
 
-__all__ = ["IncomingEnd", "OutgoingEnd", "World"]
-
 _UNBOUNDED: Final = 2**31
 
 

@@ -31,8 +31,6 @@ from hfg.parts.running.checkpointing import Checkpointer
 from hfg.parts.running.progress import Progress
 from hfg.ports.edges import EventEdge
 
-__all__ = ["Incoming", "Outgoing", "Part"]
-
 _LOGGER = Log("hfg.parts")
 _MOST_LOST: Final = 1_000_000  # of one edge at once; no part holds that many, so a higher number is wrong
 _MOST_SAID: Final = 1000  # words that wait for tokens which were sent before them

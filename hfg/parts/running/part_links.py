@@ -15,8 +15,6 @@ from hfg.parts.running.ends import IncomingEnd, OutgoingEnd, World
 from hfg.parts.running.part import Part
 from hfg.transport import Session
 
-__all__ = ["PartLinks"]
-
 _LOGGER = Log("hfg.parts")
 
 

@@ -15,8 +15,6 @@ from hfg.engine.model.running_node import ENDED, RunningNode
 from hfg.engine.runtime.borders import Inlet, Outlet
 from hfg.parts.model.inheriting import Alignment, Arrived, Inheritance, Where
 
-__all__ = ["Progress"]
-
 
 class Progress:
     """One component of a part: a connected part of its synchronous edges.

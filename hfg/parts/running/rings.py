@@ -26,8 +26,6 @@ from hfg.errors import SharedMemoryError, UsageError
 from hfg.parts.model.messages import Sees, Shares
 from hfg.sharedmemory import Reader, Ring, RingCounts, segment_name, sweep, unavailable
 
-__all__ = ["Borrowing", "Lending", "LendingCounts", "segment_of", "segments_of", "sweep_run", "sweep_runs"]
-
 _LOGGER = Log("hfg.parts")
 _REALM: Final = "run"
 _SMALLEST: Final = 2**16

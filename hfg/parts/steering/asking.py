@@ -30,8 +30,6 @@ from hfg.parts.model.failing import as_error
 from hfg.parts.model.messages import Call, Failed, Parcel, Result, Seen, Untrue
 from hfg.parts.steering.crossing import Crossing
 
-__all__ = ["Asking", "Homes", "Subscription"]
-
 _LOGGER = Log("hfg.parts")
 _NOBODY: Final = 0  # the number of calls whose result is ignored
 _CHANGES_NOTHING: Final = ("wait_for", "wait_inputs", "wait_outputs", "wait_paused", "counts", "try_edit")

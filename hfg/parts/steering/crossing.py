@@ -31,8 +31,6 @@ from hfg.trace import (
     TraceEvent,
 )
 
-__all__ = ["Crossing"]
-
 _NOTHING: Final = TokenCodec[Any](None)  # for markers, and where a text takes the place of the value
 _NO_VALUE: Final = _NOTHING.encode(Token(None))[1]
 _MOST_SHOWN: Final = 2**24  # bytes: of what is larger the text is shown

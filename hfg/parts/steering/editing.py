@@ -26,8 +26,6 @@ from hfg.graph.structure.history import MOST_STEPS
 from hfg.parts.model.redrawing import Concern, concerned
 from hfg.parts.steering.asking import Asking
 
-__all__ = ["CutEdits", "Drawing", "draw", "draw_redo", "draw_undo", "try_to_draw"]
-
 Answer = Callable[..., Awaitable[Any]]
 
 _ENDED: Final = "the run ended before the edit was made"

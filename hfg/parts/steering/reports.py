@@ -13,8 +13,6 @@ from hfg.engine.observing.report import EdgeReport, NodeReport, Report
 from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatGraph
 from hfg.parts.model.messages import Closed
 
-__all__ = ["Counts", "whole_report"]
-
 Reported = TypeVar("Reported")
 
 

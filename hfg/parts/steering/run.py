@@ -38,8 +38,6 @@ from hfg.parts.steering.reports import Counts
 from hfg.ports import EventPort, ParameterPort, Port
 from hfg.trace import Consumer
 
-__all__ = ["CutRun"]
-
 T = TypeVar("T")
 
 _NO_STATISTICS: Final = EdgeStatistics(

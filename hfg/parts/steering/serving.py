@@ -30,8 +30,6 @@ from hfg.parts.steering.crossing import Crossing
 from hfg.parts.steering.editing import draw, draw_redo, draw_undo, try_to_draw
 from hfg.trace import RunEnded, RunPaused, RunResumed, RunStarted, TraceEvent
 
-__all__ = ["Serving"]
-
 _MOST: Final = 500  # events in one message
 _OF_THE_WHOLE: Final = (RunStarted, RunEnded, RunPaused, RunResumed)  # events that the main part reports for all parts
 

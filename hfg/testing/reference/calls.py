@@ -13,8 +13,6 @@ from hfg.testing.reference.structure import ROOT, boundary_of, is_box
 from hfg.testing.reference.tasks import Tending
 from hfg.trace import CallEnded, CallStarted, ErrorRaised, FiringEnded, NodeEnabled, TokenProcessed, TokenTaken
 
-__all__ = ["Calling"]
-
 
 class Calling(Tending):
     """A machine whose slots can be called."""

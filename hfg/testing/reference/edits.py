@@ -19,8 +19,6 @@ from hfg.testing.reference.structure import ROOT, Edge, End, Structure, boundary
 from hfg.testing.reference.waiting import MOMENT_S
 from hfg.trace import ParameterSet, TokenDropped, TokenProcessed
 
-__all__ = ["Editing"]
-
 _GONE = boundary_of(10_000)
 """The sender of tokens whose sender was removed."""
 

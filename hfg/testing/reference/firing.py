@@ -23,8 +23,6 @@ from hfg.trace import (
     TokenTaken,
 )
 
-__all__ = ["Firing"]
-
 _OVER = object()
 """What an iterator gives when nothing more comes."""
 

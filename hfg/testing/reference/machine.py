@@ -27,8 +27,6 @@ from hfg.trace import (
     TraceEvent,
 )
 
-__all__ = ["Move", "ReferenceMachine"]
-
 
 @dataclass(frozen=True)
 class Move:

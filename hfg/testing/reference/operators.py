@@ -17,8 +17,6 @@ from reactivex.subject import Subject
 from hfg.base.token import Token
 from hfg.testing.reference.waiting import MOMENT_S
 
-__all__ = ["Operators"]
-
 
 class _Clock(Scheduler):
     """A scheduler whose time is told to it; what is scheduled waits in a list."""

@@ -13,8 +13,6 @@ from hfg.errors import UsageError
 from hfg.testing.reference.machine import Move, ReferenceMachine
 from hfg.trace import ActivityChanged, QueueGrown, TokenDrained, TokenDropped, TokenSent, TraceEvent
 
-__all__ = ["ReferenceReport", "reference_run"]
-
 
 @dataclass(frozen=True)
 class ReferenceReport:

@@ -14,8 +14,6 @@ from hfg.testing.reference.edits import Editing
 from hfg.testing.reference.state import Flight, Line, Station
 from hfg.testing.reference.structure import ROOT, is_box
 
-__all__ = ["Rings"]
-
 
 class _Deed(NamedTuple):
     """Whose, and what: "fire", "call", "tell", "finish", "room", "hear", or "happen" for what comes from outside."""

@@ -22,8 +22,6 @@ from hfg.testing.reference.sending import Sending
 from hfg.testing.reference.state import Flight, Station, Task
 from hfg.trace import ParameterSet
 
-__all__ = ["RunningCode"]
-
 
 class RunningCode(Sending):
     """A machine that can run functions, coroutines and iterators of nodes."""

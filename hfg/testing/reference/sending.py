@@ -28,8 +28,6 @@ from hfg.trace import (
     TraceEvent,
 )
 
-__all__ = ["Sending", "Shipment", "passed_on"]
-
 Shipment = tuple[Line, Any, int | None, float]
 """One token to be put: where, its value or marker, its explicit modifier if any, its stamp."""
 

@@ -17,8 +17,6 @@ from hfg.testing.reference.structure import ROOT, Edge, Leaf, Structure, is_box,
 from hfg.testing.reference.waiting import MOMENT_S, hand_turned_loop
 from hfg.trace import TraceEvent
 
-__all__ = ["Flight", "Line", "Lying", "State", "Station", "Task", "fresh", "newest"]
-
 
 @dataclass
 class Lying:

@@ -13,21 +13,6 @@ from typing import Any, Final, NamedTuple
 
 from hfg.graph.structure.level import level_of
 
-__all__ = [
-    "ROOT",
-    "Box",
-    "Edge",
-    "End",
-    "Gate",
-    "Leaf",
-    "Structure",
-    "boundary_of",
-    "box_owner",
-    "dissolve",
-    "is_box",
-    "whole",
-]
-
 ROOT: Final = -1
 """The owner of the graph's own ports; box k owns its automatic ports as -2 - k."""
 

@@ -17,8 +17,6 @@ from hfg.testing.reference.state import Station, Task
 from hfg.testing.reference.waiting import TEARDOWN_LIMIT_S
 from hfg.trace import DoEnded, DoStarted, ErrorRaised
 
-__all__ = ["Tending"]
-
 
 class Tending(Firing):
     """A machine whose nodes may have tasks."""

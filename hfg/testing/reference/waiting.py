@@ -17,8 +17,6 @@ from types import CoroutineType
 from typing import Any, Final
 from weakref import WeakSet
 
-__all__ = ["MOMENT_S", "TEARDOWN_LIMIT_S", "HandTurnedLoop", "hand_turned_loop"]
-
 MOMENT_S: Final = 1e-9
 """Sums of floats that differ by less are the same moment."""
 

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from hfg_transports.zenoh.inbox import Mailbox
     from hfg_transports.zenoh.sending import Sender
 
-__all__ = ["Answerer", "Question"]
-
 MOST: Final = 256
 """Answers that one answerer works on at a time; whoever asks more is refused."""
 

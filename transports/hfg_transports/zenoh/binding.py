@@ -17,8 +17,6 @@ from hfg.errors import TransportError
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["OLDEST", "Connection", "callback", "connections", "load", "network_callback"]
-
 OLDEST: Final = (1, 10)
 """The oldest version that this was tried with; the major one must be the same."""
 

@@ -12,8 +12,6 @@ from hfg_transports.zenoh.keys import tls_of_key
 from hfg_transports.zenoh.names import Keys
 from hfg_transports.zenoh.settings import Access, Mode, Settings, Tls, is_loopback
 
-__all__ = ["LONG", "configuration", "listens", "targets"]
-
 LONG: Final = 256 * 1024
 """Bytes from which a put may take longer than the event loop should stand still for."""
 

@@ -6,8 +6,6 @@ from typing import Protocol, TypeVar
 
 from hfg.base.logs import log
 
-__all__ = ["Declarations", "Declared"]
-
 
 class Declared(Protocol):
     """Something that Zenoh tells other sessions about."""

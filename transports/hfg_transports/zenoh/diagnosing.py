@@ -17,8 +17,6 @@ from hfg.base.private import exposure_of_key, may_be_changed
 from hfg_transports.zenoh.keys import authority_of_key
 from hfg_transports.zenoh.settings import Tls
 
-__all__ = ["Reason", "files_that_do_not_fit", "why_unreachable"]
-
 _PATIENCE_S: Final = 1.0
 _EXPIRED, _NOT_YET_VALID = 10, 9
 _OTHER_AUTHORITY: Final = {2, 18, 19, 20, 21}

@@ -13,8 +13,6 @@ import threading
 import weakref
 from typing import Any, Protocol
 
-__all__ = ["close_at_the_end"]
-
 
 class _Closing(Protocol):
     def close_raw(self) -> Any: ...

@@ -15,8 +15,6 @@ from typing import Final, Generic, TypeVar
 
 from hfg.base.logs import log
 
-__all__ = ["Inbox", "Mailbox"]
-
 MOST: Final = 100_000
 """Messages in one mailbox that the loop has not fetched."""
 

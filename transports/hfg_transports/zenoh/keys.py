@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from cryptography import x509
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePublicKey
 
-__all__ = ["SHORTEST", "authority_of_key", "key_of", "tls_of_key"]
-
 SHORTEST: Final = 32
 """Bytes of a key. What others can guess proves nothing, and they can try as often as they like."""
 _LONGEST: Final = 4096

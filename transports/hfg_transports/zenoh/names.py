@@ -14,8 +14,6 @@ from urllib.parse import unquote
 
 from hfg.errors import MessageTooLarge, TransportError
 
-__all__ = ["LONGEST_KEY", "WIRE_VERSION", "Keys", "escape", "join", "unescape"]
-
 WIRE_VERSION: Final = 1
 """Goes up when programs with the old one would misunderstand the new."""
 

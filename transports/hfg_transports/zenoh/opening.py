@@ -24,8 +24,6 @@ from hfg_transports.zenoh.settings import Mode, Settings, open_addresses, proble
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["WAIT_S", "open_session"]
-
 WAIT_S: Final = 10.0
 """How long an agent is waited for."""
 

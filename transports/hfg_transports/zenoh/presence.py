@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from hfg_transports.zenoh.inbox import Mailbox
 
-__all__ = ["Announcement", "Watching", "prefix_key", "presence_key", "read_presence_key"]
-
 MOST: Final = 100_000
 """Tokens that one watch remembers; whoever declares more than that means harm."""
 

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     import zenoh
 
-__all__ = ["Sender", "ZenohPublisher", "as_zenoh_takes_it", "quality"]
-
 MOST_BYTES: Final = 128 * 2**20
 """What waits in the sender's thread; one message may always."""
 

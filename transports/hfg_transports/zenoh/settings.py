@@ -34,18 +34,6 @@ import msgspec
 
 from hfg.errors import FileError, Problem
 
-__all__ = [
-    "Access",
-    "Mode",
-    "Settings",
-    "SettingsProblem",
-    "Tls",
-    "is_loopback",
-    "open_addresses",
-    "problems_of",
-    "read_settings",
-]
-
 Mode: TypeAlias = Literal["router", "peer", "client"]
 """How a session takes part: as the agent that others meet at; with connections to everybody; through an agent alone."""
 

@@ -34,8 +34,6 @@ from hfg_transports.zenoh.versions import complaint, version_key
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["ZenohSession", "ZenohTransport", "transport"]
-
 CLOSE_S: Final = 2.0
 """How long closing waits for those who stand still."""
 

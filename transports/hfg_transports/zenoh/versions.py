@@ -10,8 +10,6 @@ import importlib.metadata
 
 from hfg_transports.zenoh.names import WIRE_VERSION, Keys, escape
 
-__all__ = ["complaint", "version_key"]
-
 
 def version_key(keys: Keys, session: str) -> str:
     """Return the key of the token by which a session says what it speaks."""

@@ -13,28 +13,6 @@ from typing import Final
 from hfg.graph.drawing.layout.parts import Side, Spot, Thing
 from hfg.graph.drawing.text import shortened, width_of
 
-__all__ = [
-    "BADGE",
-    "DETAIL",
-    "GRID",
-    "LONGEST_NAME",
-    "LONGEST_PORT",
-    "LONGEST_SAID",
-    "NAME",
-    "PORT",
-    "TAG",
-    "TAG_HEIGHT",
-    "badge_width",
-    "halves",
-    "place_level",
-    "room",
-    "rooms_beside",
-    "size",
-    "tag_text",
-    "tag_width",
-    "up",
-]
-
 NAME: Final = 13.0  # sizes of letters: names of nodes, of ports, options, tags
 PORT: Final = 11.0
 DETAIL: Final = 11.0

@@ -12,8 +12,6 @@ from hfg.graph.drawing.model import EdgeEnds, Line, NodeBox, Point, PortSpot, Ta
 from hfg.graph.drawing.seen import Arrow
 from hfg.graph.drawing.text import shortened, width_of
 
-__all__ = ["lines_of", "node_of"]
-
 _PILL: Final = (18.0, 16.0)
 _CLEAR: Final = 2.0
 

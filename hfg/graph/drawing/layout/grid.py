@@ -14,8 +14,6 @@ from typing import Final
 
 from hfg.graph.drawing.layout.parts import Thing
 
-__all__ = ["GUTTER", "Axis", "Grid"]
-
 GUTTER: Final = 28.0  # between two lanes
 _NARROWEST: Final = 8.0  # channel among things placed by the user
 _ROOM: Final = 6.0

@@ -12,8 +12,6 @@ from typing import Final
 
 from hfg.graph.drawing.layout.parts import GAP, Link, Thing
 
-__all__ = ["as_layers", "layers", "walk"]
-
 _SWEEPS: Final = 6
 _BROAD: Final = 1.6  # of what is not connected: how broad against its height
 

@@ -15,8 +15,6 @@ from hfg.graph.drawing.layout.routing import Leg, corners, ends_of, route
 from hfg.graph.drawing.layout.tracks import Way, needed, tracks_of
 from hfg.graph.drawing.seen import Kind, View
 
-__all__ = ["lay"]
-
 _GUTTER_PAD: Final = 12.0  # from a lane to the first track: there is room for a comb
 _WITH_HEADS: Final = 20.0  # the same for the head of an arrow
 _GAP_PAD: Final = 12.0  # from a row to the first track: there is room for the head of an arrow

@@ -15,8 +15,6 @@ from msgspec.structs import replace
 from hfg.graph.drawing.layout.parts import Link, Spot, Thing, Work
 from hfg.graph.drawing.seen import Arrow, Picture
 
-__all__ = ["feeders", "take_out", "to_overview"]
-
 
 def feeders(seen: Picture) -> frozenset[str]:
     """Return the paths of subgraphs that are folded and feed states, but are not states themselves."""

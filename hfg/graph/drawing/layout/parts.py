@@ -12,8 +12,6 @@ import msgspec
 from hfg.graph.drawing.model import Badge
 from hfg.graph.drawing.seen import Arrow, Shape
 
-__all__ = ["GAP", "SIDES", "Link", "Side", "Spot", "Thing", "Work"]
-
 Side: TypeAlias = Literal["left", "right", "top", "bottom"]
 
 GAP: Final = 28.0  # between two rows: three tracks

@@ -16,8 +16,6 @@ from typing import Final
 from hfg.graph.drawing.layout.layers import as_layers, layers, walk
 from hfg.graph.drawing.layout.parts import GAP, Link, Side, Spot, Thing, Work
 
-__all__ = ["place", "spine_of"]
-
 _BELOW: Final = 3.0  # as bad as N rows: a row below all states
 
 

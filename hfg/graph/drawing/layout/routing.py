@@ -17,8 +17,6 @@ from hfg.graph.drawing.layout.grid import Axis, Grid
 from hfg.graph.drawing.layout.parts import Link, Side, Spot, Thing
 from hfg.graph.drawing.layout.searching import search
 
-__all__ = ["End", "Leg", "corners", "ends_of", "route"]
-
 Leg: TypeAlias = tuple[Literal["x", "y"], int]
 """A part of a way: along a strip of x, so up or down, or along one of y."""
 

@@ -13,8 +13,6 @@ from typing import Literal, TypeAlias
 
 from hfg.graph.drawing.layout.grid import Grid
 
-__all__ = ["search"]
-
 _Step: TypeAlias = tuple[int, int, str]
 """A place of the grid, and the axis along whose strip it was reached."""
 

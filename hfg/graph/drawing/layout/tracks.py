@@ -14,8 +14,6 @@ import msgspec
 from hfg.graph.drawing.layout.grid import Grid
 from hfg.graph.drawing.layout.routing import End, Leg
 
-__all__ = ["Way", "needed", "tracks_of"]
-
 PITCH: Final = 9.0
 _NEAR: Final = 8.0  # two lines next to each other can be distinguished from here on
 _OVERLAP: Final = 40  # as bad as N crossings

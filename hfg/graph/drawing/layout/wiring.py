@@ -15,8 +15,6 @@ from hfg.graph.drawing.layout.parts import SIDES, Link, Spot, Thing, Work
 from hfg.graph.drawing.model import Badge
 from hfg.graph.drawing.seen import Arrow, Kind, Picture, Pin, Shape, View
 
-__all__ = ["Level", "Levels", "wired"]
-
 _INWARDS: Final = ("input", "slot", "parameter")
 _LIMIT: Final = "active for"
 HUB: Final = 6  # from more ports that carry data than that, all of them are named
