@@ -11,7 +11,7 @@ import typer
 
 from hfg.analysis.report import MAX_STATES, ActivityReport, analyse_activity
 from hfg.cli import show
-from hfg.cli.options import AllowOption, ArgOption, TargetArgument
+from hfg.cli.options import LoadFlags, TargetArgument
 from hfg.cli.target import load_graph
 from hfg.errors import CheckFailed, FileError, HfgError, MachineError, Problem, TargetError
 from hfg.graph import Graph
@@ -21,8 +21,7 @@ from hfg.parts.model.costs import costs_of_deaths
 
 def check(
     target: TargetArgument,
-    arg: ArgOption = None,
-    allow: AllowOption = None,
+    flags: LoadFlags,
     activity: Annotated[
         bool, typer.Option("--activity", help="Also prove what may be active together, and show how activity moves.")
     ] = False,
@@ -33,15 +32,14 @@ def check(
         ),
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the problems as JSON.")] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
     """Check a graph for errors without running it (exit code 1 if there are any)."""
-    show.set_debug(debug)
+    show.set_debug(flags.debug)
     if states is not None and not activity:
         raise TargetError(f"--states {states} bounds what --activity looks at, and --activity is not given; add it")
     found = _Findings(target)
     with keep_refusals() as found.problems:
-        graph = found.load(arg or [], allow)
+        graph = found.load(flags)
     if graph is not None:
         found.look_at(graph, MAX_STATES if states is None else states, activity=activity)
     if json:
@@ -65,14 +63,14 @@ class _Findings:
         self._costs: Sequence[Problem] = ()
         self._activity: ActivityReport | None = None
 
-    def load(self, arguments: Sequence[str], allow: Sequence[str] | None) -> Graph | None:
+    def load(self, flags: LoadFlags) -> Graph | None:
         """Build the graph; nothing where its code or its file is refused.
 
         Raises:
             TargetError: there is no such target, so nothing was looked at.
         """
         try:
-            return load_graph(self._target, arguments, allow)
+            return load_graph(self._target, flags.arg, flags.allow)
         except TargetError as error:
             if not isinstance(error.__cause__, Exception):
                 raise

@@ -13,13 +13,14 @@ import typer
 
 from hfg.base.whole import write_whole
 from hfg.cli import completing, show
-from hfg.cli.options import AllowOption, ArgOption
+from hfg.cli.options import LoadFlags
 from hfg.cli.target import SUFFIXES, import_from_here, load_graph
 from hfg.errors import TargetError, UsageError
 from hfg.files import apex, describe, save, schema, text_of, write
 
 
 def convert(
+    flags: LoadFlags,
     target: Annotated[
         str | None,
         typer.Argument(
@@ -29,8 +30,6 @@ def convert(
     out: Annotated[
         Path | None, typer.Argument(help="a file name that ends in .hfg.yaml; default: standard output")
     ] = None,
-    arg: ArgOption = None,
-    allow: AllowOption = None,
     json_schema: Annotated[
         bool,
         typer.Option(
@@ -41,24 +40,23 @@ def convert(
     json: Annotated[
         bool, typer.Option("--json", help="For a CS::APEX file: report how each part was converted, as JSON.")
     ] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
     """Write a graph to a graph file. Fails without writing anything if part of the graph cannot be stored.
 
     For a CS::APEX file, it reports what is mapped, approximated and missing.
     """
-    show.set_debug(debug)
+    show.set_debug(flags.debug)
     if json_schema:
         if out is not None:
             raise TargetError("--schema needs no TARGET: write hfg convert --schema FILE, or leave FILE out")
-        return _write_schema(target, allow or ())
+        return _write_schema(target, flags.allow or ())
     if target is None:
         raise TargetError("there is no TARGET: write hfg convert graph.py graph.hfg.yaml")
     if target.endswith(SUFFIXES):
         return _import_apex(target, out, json)
     if json:
         raise TargetError("--json tells what became of a file of CS::APEX; leave it out")
-    graph = load_graph(target, arg or [], allow)
+    graph = load_graph(target, flags.arg, flags.allow)
     if out is None:
         show.write(text_of(describe(graph, beside=Path("graph.hfg.yaml"))))
         return 0

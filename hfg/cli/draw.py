@@ -8,13 +8,14 @@ from typing import Annotated, Literal
 import typer
 
 from hfg.cli import show
-from hfg.cli.options import AllowOption, ArgOption, TargetArgument
+from hfg.cli.options import LoadFlags, TargetArgument
 from hfg.cli.target import load_graph
 from hfg.errors import GraphError, UsageError
 
 
 def draw(
     target: TargetArgument,
+    flags: LoadFlags,
     out: Annotated[
         Path | None, typer.Argument(help="a file name that ends in .svg, .mmd or .dot; default: standard output")
     ] = None,
@@ -32,17 +33,14 @@ def draw(
         Literal["activity", "mission", "all"] | None,
         typer.Option(help="An SVG shows states and what feeds them, all with bundles, or each edge by itself."),
     ] = None,
-    arg: ArgOption = None,
-    allow: AllowOption = None,
     format: Annotated[  # noqa: A002 - the word users know
         Literal["svg", "mmd", "dot"] | None,
         typer.Option("--format", help="SVG, Mermaid or Graphviz. Default: by the file name, or else Mermaid."),
     ] = None,
-    debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
     """Draw a graph without running it."""
-    show.set_debug(debug)
-    graph = load_graph(target, arg or [], allow)
+    show.set_debug(flags.debug)
+    graph = load_graph(target, flags.arg, flags.allow)
     try:
         text = graph.draw(out, depth=depth, fold=fold or (), active=active, ports=ports, view=view, format=format)
     except (GraphError, UsageError) as error:

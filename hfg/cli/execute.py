@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from hfg.cli import show
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.live import Live, live_table
-from hfg.cli.options import Clock
+from hfg.cli.options import Clock, RunFlags
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
 from hfg.engine import PunctualLoop, Report, Run, VirtualTimeLoop, run_async
@@ -31,25 +31,22 @@ class GraphRun:
       error: the error that ended the run.
     """
 
-    def __init__(self, graph: Graph, target: str, clock: Clock) -> None:
+    def __init__(self, graph: Graph, target: str, flags: RunFlags) -> None:
         self.graph = graph
-        self.clock = clock
+        self.clock = flags.clock
         self.interrupt = Interrupt.current or Interrupt()
         self.report: Report | None = None
         self.error: HfgError | None = None
         self._target = target
+        self._flags = flags
         self._run: Run | None = None
 
     @classmethod
     def load(
         cls,
         target: str,
-        clock: Clock,
+        flags: RunFlags,
         *,
-        param: Sequence[str] | None,
-        arg: Sequence[str] | None = None,
-        allow: Sequence[str] | None,
-        debug: bool,
         verbose: int = 0,
         prepare: Callable[[Graph], object] = lambda graph: None,
     ) -> GraphRun:
@@ -57,24 +54,20 @@ class GraphRun:
 
         Args:
           target: as the user wrote it.
-          clock: the clock of the run.
-          param: see `options`, as for the other arguments.
-          arg: see there.
-          allow: see there.
-          debug: see there.
-          verbose: see there.
+          flags: how it is loaded and run.
+          verbose: how much is reported.
           prepare: called with the graph before its parameters are set.
 
         Raises:
           HfgError: the graph cannot be loaded, or a parameter cannot be set.
         """
-        show.set_debug(debug)
-        records = show.Records(verbose, debug, virtual=clock is Clock.virtual)
-        graph = load_graph(target, arg or [], allow)
+        show.set_debug(flags.debug)
+        records = show.Records(verbose, flags.debug, virtual=flags.clock is Clock.virtual)
+        graph = load_graph(target, flags.arg, flags.allow)
         records.loaded()
         prepare(graph)
-        set_parameters(graph, param or [])
-        return cls(graph, target, clock)
+        set_parameters(graph, flags.param or [])
+        return cls(graph, target, flags)
 
     @contextmanager
     def table(self, wanted: bool) -> Iterator[Live]:
@@ -89,7 +82,7 @@ class GraphRun:
         Args:
           begin: called with the run before its nodes are set up. If it returns an awaitable, this is awaited when the
             run is over.
-          **options: of `hfg.run_async`.
+          **options: of `hfg.run_async`, besides those that the flags say.
 
         Raises:
           TargetError: the options do not fit.
@@ -112,6 +105,7 @@ class GraphRun:
             self.error = None if self._run is None else self._run.error
 
     async def _main(self, begin: Callable[[Run], Awaitable[None] | None] | None, options: dict[str, Any]) -> Report:
+        options |= {"clock": self.clock.value, "until_s": self._flags.until, "debug": self._flags.debug}
         task = asyncio.current_task()
         assert task is not None
         waiting: list[Awaitable[None]] = []
@@ -124,7 +118,7 @@ class GraphRun:
         watch = self._target if self.clock is Clock.real else False
         with self.interrupt.cancels(task):
             try:
-                return await run_async(self.graph, clock=self.clock.value, begin=begun, watch=watch, **options)
+                return await run_async(self.graph, begin=begun, watch=watch, **options)
             finally:
                 for one in waiting:
                     await one

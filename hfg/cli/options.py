@@ -1,10 +1,14 @@
-"""Arguments and options that several verbs have; those of a run follow from their declaration."""
+"""Arguments and options that several verbs have, alone and in groups; those of a run follow from their declaration.
+
+A verb takes a group as one argument; `with_flags` gives it a flag for each option of the group.
+"""
 
 from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import Annotated, Any, get_type_hints
 
@@ -34,7 +38,6 @@ TargetArgument = Annotated[
         help="module:graph, file.py, file.py:graph, file.hfg.yaml or file.apex", autocompletion=completing.targets
     ),
 ]
-ClockOption = Annotated[Clock, typer.Option(help="virtual: as fast as possible, and reproducible.")]
 UntilOption = Annotated[
     float | None,
     typer.Option(metavar="SECONDS", callback=_not_negative, help="Stop after this many seconds."),
@@ -66,35 +69,67 @@ SettingsOption = Annotated[
     typer.Option(metavar="FILE", help="Settings of the realm (TOML): addresses of agents and other hosts."),
 ]
 TableOption = Annotated[bool, typer.Option(help="Show a live table of nodes (on a terminal and the real clock).")]
-DebugOption = Annotated[
-    bool, typer.Option("--debug", help="Check values against port types; show hfg's own frames in tracebacks.")
-]
 ForceOption = Annotated[bool, typer.Option("--force", help="Replace an existing file.")]
 VerboseOption = Annotated[
     int, typer.Option("-v", "--verbose", count=True, help="Report each node; with -vv, each edge.")
 ]
 
 
-def with_run_options(verb: Callable[..., int]) -> Callable[..., int]:
-    """Add to a verb the flags that options of a run declare; it receives them by name, in `**options`."""
-    signature = inspect.signature(verb)
-    hints = get_type_hints(verb, include_extras=True)
-    own = [one.replace(annotation=hints[one.name]) for one in signature.parameters.values() if one.name != "options"]
-    flags = [
-        inspect.Parameter(
-            one.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=one.default,
-            annotation=Annotated[one.type, typer.Option(one.option.flag, help=one.option.says.replace("`", ""))],
-        )
-        for one in declared(RunFields).values()
-        if one.option.flag
-    ]
+@dataclass(frozen=True, kw_only=True)
+class LoadFlags:
+    """How a graph is loaded."""
+
+    arg: ArgOption = None
+    allow: AllowOption = None
+    debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunFlags:
+    """How a graph is loaded and run."""
+
+    clock: Annotated[Clock, typer.Option(help="virtual: as fast as possible, and reproducible.")] = Clock.real
+    until: UntilOption = None
+    param: ParamOption = None
+    arg: ArgOption = None
+    allow: AllowOption = None
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Check values against port types; show hfg's own frames in tracebacks.")
+    ] = False
+
+
+def with_flags(verb: Callable[..., int]) -> Callable[..., int]:
+    """Give a verb a flag for each option of the groups that it takes."""
+    signature, hints = inspect.signature(verb), get_type_hints(verb, include_extras=True)
+    groups = {
+        name: (hint, list(_flags(hint))) for name, hint in hints.items() if hint in (LoadFlags, RunFlags, RunFields)
+    }
+    own = [one.replace(annotation=hints[name], kind=one.KEYWORD_ONLY) for name, one in signature.parameters.items()]
+    spread = [flag for one in own for flag in (groups[one.name][1] if one.name in groups else [one])]
 
     @functools.wraps(verb)
-    def run(*arguments: Any, **named: Any) -> int:
-        return verb(*arguments, **named)
+    def run(**named: Any) -> int:
+        for name, (group, flags) in groups.items():
+            named[name] = group(**{flag.name: named.pop(flag.name) for flag in flags})
+        return verb(**named)
 
-    run.__dict__["__signature__"] = signature.replace(parameters=[*own, *flags])
-    run.__annotations__ = {one.name: one.annotation for one in (*own, *flags)} | {"return": int}
+    run.__dict__["__signature__"] = signature.replace(parameters=spread)
+    run.__annotations__ = {one.name: one.annotation for one in spread} | {"return": int}
     return run
+
+
+def _flags(group: Any) -> Iterator[inspect.Parameter]:
+    """Yield the flags of a group; of the options of a run, those that declare one."""
+    if group is not RunFields:
+        hints = get_type_hints(group, include_extras=True)
+        for field in fields(group):
+            yield _flag(field.name, hints[field.name], field.default)
+        return
+    for one in declared(RunFields).values():
+        if one.option.flag:
+            how = typer.Option(one.option.flag, help=one.option.says.replace("`", ""))
+            yield _flag(one.name, Annotated[one.type, how], one.default)
+
+
+def _flag(name: str, hint: Any, default: Any) -> inspect.Parameter:
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)

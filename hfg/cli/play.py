@@ -9,18 +9,7 @@ import typer
 
 from hfg.cli import show
 from hfg.cli.execute import GraphRun
-from hfg.cli.options import (
-    AllowOption,
-    ArgOption,
-    Clock,
-    ClockOption,
-    DebugOption,
-    ForceOption,
-    ParamOption,
-    TableOption,
-    UntilOption,
-    VerboseOption,
-)
+from hfg.cli.options import ForceOption, RunFlags, TableOption, VerboseOption
 from hfg.cli.record import told
 from hfg.engine import Run
 from hfg.errors import GraphError, TargetError, UsageError
@@ -32,6 +21,7 @@ from hfg.recording import record as begin_recording
 def play(
     file: Annotated[Path, typer.Argument(help="a recording, as hfg record writes it")],
     into: Annotated[str, typer.Option("--into", metavar="TARGET", help="The graph: module:graph or file.py.")],
+    flags: RunFlags,
     mapped: Annotated[
         list[str] | None,
         typer.Option(
@@ -44,13 +34,7 @@ def play(
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="Record the run again.")] = None,
     force: ForceOption = False,
     pickle: Annotated[bool, typer.Option("--pickle", help="Read pickled values, which runs code.")] = False,
-    clock: ClockOption = Clock.real,
-    until: UntilOption = None,
-    param: ParamOption = None,
-    arg: ArgOption = None,
-    allow: AllowOption = None,
     table: TableOption = True,
-    debug: DebugOption = False,
     verbose: VerboseOption = 0,
 ) -> int:
     """Play a recording into a graph, in place of the recorded sources."""
@@ -63,9 +47,7 @@ def play(
         except (UsageError, GraphError) as wrong:
             raise TargetError(str(wrong)) from None
 
-    running = GraphRun.load(
-        into, clock, param=param, arg=arg, allow=allow, debug=debug, verbose=verbose, prepare=prepare
-    )
+    running = GraphRun.load(into, flags, verbose=verbose, prepare=prepare)
     for path in played[0].rest:
         show.sentence(f'"{path}" is disabled: all its tokens went to nodes that are played')
     recordings: list[Recording] = []
@@ -76,7 +58,7 @@ def play(
                 recordings.append(begin_recording(run, output, force=force, pickle=pickle))
             live.begin(run)
 
-        running.run(begin, until_s=until, debug=debug)
+        running.run(begin)
     code = told(recordings[0]) if recordings else 0
     return running.ended(verbose=verbose) or code or int(played[0].is_damaged)
 

@@ -12,18 +12,7 @@ import typer
 
 from hfg.cli import show
 from hfg.cli.execute import GraphRun
-from hfg.cli.options import (
-    AllowOption,
-    ArgOption,
-    Clock,
-    ClockOption,
-    DebugOption,
-    ForceOption,
-    ParamOption,
-    TableOption,
-    TargetArgument,
-    UntilOption,
-)
+from hfg.cli.options import ForceOption, RunFlags, TableOption, TargetArgument
 from hfg.engine import Run
 from hfg.recording import Recording
 from hfg.recording import record as begin_recording
@@ -38,6 +27,7 @@ class _Images(StrEnum):
 def record(
     target: TargetArgument,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="The recording, as in run.mcap.")],
+    flags: RunFlags,
     select: Annotated[
         list[str] | None,
         typer.Option(
@@ -49,16 +39,10 @@ def record(
     images: Annotated[_Images, typer.Option(help="Image format; png is lossless.")] = _Images.raw,
     pickle: Annotated[bool, typer.Option("--pickle", help="Pickle values that are not plain data.")] = False,
     force: ForceOption = False,
-    clock: ClockOption = Clock.real,
-    until: UntilOption = None,
-    param: ParamOption = None,
-    arg: ArgOption = None,
-    allow: AllowOption = None,
     table: TableOption = True,
-    debug: DebugOption = False,
 ) -> int:
     """Run a graph and record its ports for hfg play, hfg info and Foxglove. Ctrl-C ends the recording properly."""
-    running = GraphRun.load(target, clock, param=param, arg=arg, allow=allow, debug=debug)
+    running = GraphRun.load(target, flags)
     recordings: list[Recording] = []
     with redirect_stdout(sys.stderr), running.table(table) as live:
 
@@ -68,7 +52,7 @@ def record(
             recordings[0].when_failed = run.stop  # the run has no other purpose
             live.begin(run)
 
-        running.run(begin, until_s=until, debug=debug)
+        running.run(begin)
     code = told(recordings[0]) if recordings else 1
     return running.ended() or code
 

@@ -15,23 +15,11 @@ import typer
 from hfg.base.whole import GrowingFile
 from hfg.cli import show
 from hfg.cli.execute import GraphRun
-from hfg.cli.options import (
-    AllowOption,
-    ArgOption,
-    Clock,
-    ClockOption,
-    DebugOption,
-    ParamOption,
-    SettingsOption,
-    TableOption,
-    TargetArgument,
-    UntilOption,
-    VerboseOption,
-    with_run_options,
-)
+from hfg.cli.options import RunFlags, SettingsOption, TableOption, TargetArgument, VerboseOption
 from hfg.engine import Run
 from hfg.engine.observing.encoding import encode
 from hfg.engine.observing.report import RunPage
+from hfg.engine.runtime.settings import RunFields
 from hfg.errors import TargetError
 from hfg.timeline import Timeline
 from hfg.trace import TraceEvent
@@ -39,14 +27,10 @@ from hfg.trace import TraceEvent
 _TRACES: Final = ("", ".jsonl", ".json")
 
 
-@with_run_options
 def run(
     target: TargetArgument,
-    clock: ClockOption = Clock.real,
-    until: UntilOption = None,
-    param: ParamOption = None,
-    arg: ArgOption = None,
-    allow: AllowOption = None,
+    flags: RunFlags,
+    options: RunFields,  # those that declare a flag
     settings: SettingsOption = None,
     trace: Annotated[
         Path | None,
@@ -72,12 +56,10 @@ def run(
         bool,
         typer.Option("--explain", help="Afterwards, tell for each node whether it was fused, and if not, why."),
     ] = False,
-    debug: DebugOption = False,
     verbose: VerboseOption = 0,
-    **options: Any,  # those that declare a flag
 ) -> int:
     """Run a graph. Ctrl-C stops it; a second Ctrl-C stops it immediately."""
-    running = GraphRun.load(target, clock, param=param, arg=arg, allow=allow, debug=debug, verbose=verbose)
+    running = GraphRun.load(target, flags, verbose=verbose)
     output = _Output(sys.stdout)
     unwritten: list[str] = []
     pages: list[RunPage] = []
@@ -96,7 +78,7 @@ def run(
                 running.interrupt.before_leaving.append(pages[0].write)
             live.begin(run)
 
-        running.run(begin, until_s=until, debug=debug, trace=write, settings=settings, **options)
+        running.run(begin, trace=write, settings=settings, **options.said())
     for page in pages:
         if page.error is not None:
             show.sentence(f'the report "{page.path}" cannot be written: {page.error.strerror}')

@@ -16,7 +16,7 @@ import typer
 
 from hfg.cli import show
 from hfg.cli.interrupt import Interrupt
-from hfg.cli.options import AllowOption, ArgOption, DebugOption, ParamOption
+from hfg.cli.options import LoadFlags, ParamOption
 from hfg.cli.settings import set_parameters
 from hfg.cli.sockets import find, which
 from hfg.cli.target import load_graph
@@ -32,6 +32,7 @@ from hfg.studio.studio import Studio
 
 
 def studio(
+    flags: LoadFlags,
     target: Annotated[
         str | None,
         typer.Argument(help="module:graph, file.py, file.hfg.yaml or a recording, run.mcap; default: an empty graph"),
@@ -52,12 +53,9 @@ def studio(
     keyfile: Annotated[Path | None, typer.Option(help="Its private key (PEM).")] = None,
     insecure: Annotated[bool, typer.Option("--insecure", help="Let other machines in without TLS.")] = False,
     param: ParamOption = None,
-    arg: ArgOption = None,
-    allow: AllowOption = None,
-    debug: DebugOption = False,
 ) -> int:
     """Build, watch and steer a graph in the browser."""
-    show.set_debug(debug)
+    show.set_debug(flags.debug)
     try:
         import hfg.studio.serving  # noqa: F401 - of the extra
     except ImportError as error:
@@ -72,14 +70,15 @@ def studio(
     if attach is not None:
         return _attach(attach, target, options, browser, read_only=read_only)
     if target is not None and target.endswith(".mcap"):
-        return _look_at(target, into, arg, allow, options, browser, at_once=run, read_only=_why(read_only))
+        return _look_at(target, into, flags, options, browser, at_once=run, read_only=_why(read_only))
     if into is not None:
         raise TargetError(f'--into names the graph of a recording, so "{into}" means nothing here; leave it out')
-    graph = Graph("graph") if target is None else load_graph(target, arg or [], allow)
+    graph = Graph("graph") if target is None else load_graph(target, flags.arg, flags.allow)
     set_parameters(graph, param or [])
     file = _file_of(target)
     folder = Path.cwd() if file is None else file.resolve().parent
-    project = Project(graph, folder, file, allow=allow or (), read=lambda path: load_graph(str(path), [], allow))
+    allow = flags.allow or ()
+    project = Project(graph, folder, file, allow=allow, read=lambda path: load_graph(str(path), [], allow))
     _need_subgraph(graph, inside)
     made = Studio(project, read_only=_why(read_only), target=target or graph.name, level=inside)
     return _serve(made, options, browser, at_once=run)
@@ -97,8 +96,7 @@ def _need_subgraph(graph: Graph, path: str) -> None:
 def _look_at(
     file: str,
     into: str | None,
-    arg: list[str] | None,
-    allow: list[str] | None,
+    flags: LoadFlags,
     options: Mapping[str, Any],
     browser: bool,
     *,
@@ -108,12 +106,12 @@ def _look_at(
     """Serve pages of a recording."""
     from hfg.studio.recorded import Recorded
 
-    graph = None if into is None else load_graph(into, arg or [], None if allow is None else allow)
+    graph = None if into is None else load_graph(into, flags.arg, flags.allow)
     try:
-        recorded = Recorded(file, graph, allow=allow or ())
+        recorded = Recorded(file, graph, allow=flags.allow or ())
     except UsageError as error:
         raise TargetError(str(error)) from None
-    project = RecordedProject(recorded.graph_after(0), Path(file), allow=allow or ())
+    project = RecordedProject(recorded.graph_after(0), Path(file), allow=flags.allow or ())
     return _serve(Studio(project, recorded=recorded, read_only=read_only), options, browser, at_once=at_once)
 
 

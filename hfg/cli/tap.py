@@ -18,7 +18,7 @@ import typer
 from hfg.base.controls import escaped
 from hfg.cli import completing, show
 from hfg.cli.execute import GraphRun
-from hfg.cli.options import AllowOption, Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
+from hfg.cli.options import Clock, RunFlags, TargetArgument
 from hfg.cli.sockets import Line, find, is_process, which
 from hfg.cli.target import SUFFIXES, import_from_here
 from hfg.engine import Run
@@ -38,35 +38,31 @@ def tap(
             help='a port, as in camera.out, or an edge, "camera.out -> detect.image"', autocompletion=completing.ports
         ),
     ],
-    clock: ClockOption = Clock.real,
-    until: UntilOption = None,
+    flags: RunFlags,
     limit: Annotated[int | None, typer.Option("-n", "--limit", min=1, help="Stop after N tokens.")] = None,
     rate: Annotated[
         float | None, typer.Option(metavar="HZ", help="Print at most this many tokens per second, the newest.")
     ] = None,
-    param: ParamOption = None,
-    allow: AllowOption = None,
     json: Annotated[bool, typer.Option("--json", help="Write each token as a JSON object.")] = False,
-    debug: DebugOption = False,
 ) -> int:
     """Print the tokens that pass a port or an edge, one per line. Output of nodes goes to standard error.
 
     This runs the graph. If TARGET is a process id or the name of a running graph, as hfg top shows them, it watches
     that run instead.
     """
-    show.set_debug(debug)
+    show.set_debug(flags.debug)
     if there := _runs_already(target):
-        if param or until is not None or clock is not Clock.real:
+        if flags.param or flags.arg or flags.until is not None or flags.clock is not Clock.real:
             raise TargetError(
-                f"the run {target} is only watched and not changed: leave out --param, --until and --clock"
+                f"the run {target} is only watched and not changed: leave out --param, --arg, --until and --clock"
             )
         if len(there) > 1:
             return which("tap", there)
         return _look_at(there[0].name, Question("tap", path, rate, json), limit)
-    running = GraphRun.load(target, clock, param=param, allow=allow, debug=debug)
+    running = GraphRun.load(target, flags)
     printer = _Printer(path, limit, rate, json)
     with redirect_stdout(sys.stderr):
-        running.run(printer.begin, until_s=until, debug=debug)
+        running.run(printer.begin)
     if printer.broken is not None:
         raise printer.broken
     code = running.ended(reports=False)

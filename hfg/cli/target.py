@@ -27,7 +27,7 @@ SUFFIXES: Final = (".apex", ".apexs")
 """Of files of CS::APEX."""
 
 
-def load_graph(target: str, given: Sequence[str] = (), allow: Sequence[str] | None = None) -> Graph:
+def load_graph(target: str, given: Sequence[str] | None = None, allow: Sequence[str] | None = None) -> Graph:
     """Import the target. Return its graph, which is built if necessary.
 
     Args:
@@ -40,6 +40,7 @@ def load_graph(target: str, given: Sequence[str] = (), allow: Sequence[str] | No
       TargetError: there is no such file, module or name, its code fails, or the name is not of a graph; `__cause__` is
         the user's exception.
     """
+    given = given or ()
     if target.endswith((".yaml", ".yml")):
         if given:
             raise TargetError(f"{target} is a graph file, not a function, so --arg {given[0]} means nothing to it")

@@ -50,7 +50,9 @@ class _Verb(typer.core.TyperCommand):
         if hasattr(module, "verbs"):
             holder.add_typer(module.verbs, name=name)
         else:
-            holder.command(name)(getattr(module, name))
+            from hfg.cli.options import with_flags  # here, because it needs the engine's options
+
+            holder.command(name)(with_flags(getattr(module, name)))
         return typer.main.get_group(holder).commands[name]
 
 

@@ -85,10 +85,12 @@ def make(count: int) -> hfg.Graph:
 """
 
 
-def test_run_check_and_draw_take_arguments(command: Callable[..., Any]) -> None:
+def test_run_tap_check_and_draw_take_arguments(command: Callable[..., Any]) -> None:
     Path("made.py").write_text(FILE, encoding="utf-8")
     assert command("check", "made.py:make", "--arg", "count=3").code == 0
     assert command("draw", "made.py", "--arg", "count=3").code == 0
+    tapped = command("tap", "made.py:make", "script.out", "--arg", "count=3", "--clock", "virtual")
+    assert tapped.out.splitlines()[-2:] == ["0.000 s  2", "0.000 s  END"], tapped
     ran = command("run", "made.py:make", "--arg", "count=3", "--clock", "virtual")
     assert ran.code == 0, ran
     missing = command("run", "made.py:make")

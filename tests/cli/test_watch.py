@@ -184,10 +184,13 @@ def test_tap_ends_with_the_run_and_says_so(command: Command) -> None:
     ("arguments", "sentence"),
     [
         (("tick.out",), 'graph "ticking" has no node "tick"; did you mean "ticks"?'),
-        (("ticks.out", "--until", "3"), "is only watched and not changed: leave out --param, --until and --clock"),
+        (
+            ("ticks.out", "--until", "3"),
+            "is only watched and not changed: leave out --param, --arg, --until and --clock",
+        ),
         (
             ("ticks.out", "--param", "ticks.count=3"),
-            "is only watched and not changed: leave out --param, --until and --clock",
+            "is only watched and not changed: leave out --param, --arg, --until and --clock",
         ),
     ],
 )

@@ -158,14 +158,14 @@ LEAVES_THE_COMMAND = """
     import hfg
     from hfg.cli.execute import GraphRun
     from hfg.cli.interrupt import Interrupt
-    from hfg.cli.options import Clock
+    from hfg.cli.options import RunFlags
     from hfg.parts.processes.rendezvous import Rendezvous
     def begin(run):
         begin.place = Rendezvous()
         for _ in range(2):
             os.kill(os.getpid(), signal.SIGINT)
     with Interrupt.installed():
-        GraphRun(hfg.Graph(), "it", Clock.real).run(begin)
+        GraphRun(hfg.Graph(), "it", RunFlags()).run(begin)
 """
 
 
