@@ -1,6 +1,6 @@
-"""Arguments and options that several verbs have, alone and in groups; those of a run follow from their declaration.
+"""Arguments and options that several verbs have, singly and in groups; those of a run follow from their declaration.
 
-A verb takes a group as one argument; `with_flags` gives it a flag for each option of the group.
+A verb takes a group as one argument; `with_flags` replaces it by the flags.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class RunFlags:
 
 
 def with_flags(verb: Callable[..., int]) -> Callable[..., int]:
-    """Give a verb a flag for each option of the groups that it takes."""
+    """Replace each group of options that a verb takes by a flag for each of them."""
     signature, hints = inspect.signature(verb), get_type_hints(verb, include_extras=True)
     groups = {
         name: (hint, list(_flags(hint))) for name, hint in hints.items() if hint in (LoadFlags, RunFlags, RunFields)
