@@ -28,12 +28,14 @@ from hfg.engine.rules.sources import find_dead_sources
 from hfg.engine.runtime import plan, ports
 from hfg.graph import Graph
 from hfg.graph.flat import End, FlatEdge
-from hfg.graph.structure.edge import is_feed
+from hfg.graph.structure.edge import Edge, is_feed
+from hfg.graph.structure.gates import Gate as DeclaredGate
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.places import edge_place, home_of, node_place
+from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget
 from hfg.ports.automatic import is_automatic_event
-from hfg.ports.edges import BufferEdge, EventEdge
+from hfg.ports.edges import AnyEdge, BufferEdge, EventEdge
 from hfg.trace import ActivityLost
 
 __all__ = ["apply"]
@@ -41,7 +43,7 @@ __all__ = ["apply"]
 
 def apply(
     core: Core, index: PlanIndex, graph: Graph, found: PlanDiff, come: list[RunningNode], groups: Mapping[str, Group]
-) -> tuple[list[tuple[Any, FlatEdge]], set[Any]]:
+) -> tuple[list[tuple[AnyEdge, FlatEdge]], set[Node]]:
     """Apply a diff.
 
     Args:
@@ -73,13 +75,14 @@ class _Ends(plan.Ends):
         self._index = index
 
     def of(self, end: End) -> RunningNode:
-        worker = self._index.by_node.get(getattr(end.port, "node", None))
+        node = getattr(end.port, "node", None)  # the graph's own ports have none
+        worker = None if node is None else self._index.by_node.get(node)
         if worker is None or isinstance(end.port, InnerSource | InnerTarget):
             return self.at_border(end, None if worker is None else worker.iteration)
         return worker
 
     def scopes_of(self, flat: FlatEdge) -> tuple[Scope, ...]:
-        return tuple(_scope_of(self._index, box) for box in flat.via)
+        return tuple(_scope_of(self._index, box) for box in flat.via)  # a `Follower` has no numbers, but subgraphs
 
 
 def _scope_of(index: PlanIndex, box: Any) -> Scope:
@@ -93,7 +96,7 @@ class _Applying(Placing):
 
     # --- edges
 
-    def connect(self) -> list[tuple[Any, FlatEdge]]:
+    def connect(self) -> list[tuple[AnyEdge, FlatEdge]]:
         """Wire new edges, and give those that stay their new options."""
         relabelled = self._called_otherwise()
         for edge in self.found.old:
@@ -113,12 +116,12 @@ class _Applying(Placing):
             source.sort_outgoing()
         return [(edge, way) for edge, way, is_new in ways if is_new]
 
-    def _list_edges(self) -> list[tuple[Any, FlatEdge, bool]]:
+    def _list_edges(self) -> list[tuple[AnyEdge, FlatEdge, bool]]:
         """Put all edges of the diff into the order of the plan; return them, and which of them are new."""
         core, index = self.core, self.index
         ends = _Ends(core, index, self.groups["loop"])
         numbering = index.edges.numbering
-        ways: list[tuple[Any, FlatEdge, bool]] = []
+        ways: list[tuple[AnyEdge, FlatEdge, bool]] = []
         begin, position = None, 0
         for way, running in self.found.ways:
             edge = running
@@ -146,7 +149,7 @@ class _Applying(Placing):
                 edge.target.lead_in(edge, "slot", edge.port_name)
             edge.rename(plan.outside_label(edge.target, edge.port_name))
 
-    def _spot(self, begin: Any) -> int:
+    def _spot(self, begin: Edge) -> int:
         """Return the position in the plan of the edges that begin with a declared one."""
         place = edge_place(home_of(begin, self.graph), begin)
         return bisect_left(
@@ -155,7 +158,7 @@ class _Applying(Placing):
             key=lambda edge: edge_place(home_of(edge.segments[0], self.graph), edge.segments[0]),
         )
 
-    def _say(self, edge: Any, way: FlatEdge) -> None:
+    def _say(self, edge: AnyEdge, way: FlatEdge) -> None:
         """Set the new options of an edge that stays."""
         if edge.active != way.active:
             edge.carry(way.active)
@@ -164,7 +167,7 @@ class _Applying(Placing):
 
     # --- labels
 
-    def _called_otherwise(self) -> dict[Any, None]:
+    def _called_otherwise(self) -> dict[AnyEdge, None]:
         """Take the labels from all edges that may get another one; return the edges."""
         found = self.found
         bases = {_base(edge.label): None for edge in found.old}
@@ -175,7 +178,7 @@ class _Applying(Placing):
             for edge in (*worker.edges_in(), *worker.all_out_edges(), *at_border):
                 if edge.segments:
                     bases |= {_base(edge.label): None, _name(edge): None}
-        taken: dict[Any, None] = {}
+        taken: dict[AnyEdge, None] = {}
         for base in bases:
             label, number = base, 1
             while label in self.index.labels:
@@ -184,7 +187,7 @@ class _Applying(Placing):
                 label = f"{base} #{number}"
         return taken
 
-    def _label(self, taken: dict[Any, None], listed: list[Any]) -> None:
+    def _label(self, taken: dict[AnyEdge, None], listed: list[AnyEdge]) -> None:
         """Label edges by their ends, and number those that have the same ends through different ports of subgraphs."""
         labels = self.index.labels
         for edge in sorted({**taken, **dict.fromkeys(listed)}, key=by_index):
@@ -247,7 +250,7 @@ class _Applying(Placing):
 
     # --- going on
 
-    def go_on(self, new: list[tuple[Any, FlatEdge]]) -> None:
+    def go_on(self, new: list[tuple[AnyEdge, FlatEdge]]) -> None:
         """Derive what follows from the new wiring, then release the tokens on edges that are gone."""
         for worker in self.come:
             worker.allow(STARTING)
@@ -266,7 +269,7 @@ class _Applying(Placing):
         find_dead_sources(self.core)
         self.core.waits_changed()
 
-    def _begin(self, edge: Any) -> None:
+    def _begin(self, edge: AnyEdge) -> None:
         """Start an edge: its initial tokens are on it now (P7)."""
         edge.enliven(wiring.is_live(edge))
         if isinstance(edge, BufferEdge | EventEdge) and edge.initial:
@@ -314,7 +317,7 @@ class _Applying(Placing):
                     core.trace_changes(ActivityLost(core.now(), worker.path))
         touch(core, [scope for scope in self.scopes if scope.watched])
 
-    def changed_nodes(self) -> set[Any]:
+    def changed_nodes(self) -> set[Node]:
         """Return the nodes and subgraphs that have changed."""
         found = self.found
         workers = [*self.touched, *found.gone, *found.boxes_gone, *found.renamed]
@@ -343,7 +346,7 @@ def _base(label: str) -> str:
     return base if number_sign and number.isdigit() else label
 
 
-def _name(edge: Any) -> str:
+def _name(edge: AnyEdge) -> str:
     """Return the label of an edge without a number."""
     return f"{_path(edge.source_port)} -> {_path(edge.target_port)}"
 
@@ -352,7 +355,7 @@ def _path(port: Any) -> str:
     return "observable" if is_feed(port) else str(getattr(port, "outer", port).path)
 
 
-def _gates_of(graph: Graph) -> list[Any]:
+def _gates_of(graph: Graph) -> list[DeclaredGate]:
     """Return all gates of a whole graph, in the order of the plan."""
     levels = [level for level in level_of(graph).walk() if level.gates.listed]
     levels.sort(key=lambda level: () if level.owner is None else node_place(level.owner))

@@ -48,6 +48,7 @@ from hfg.graph.editing.commands import Command, encode
 from hfg.graph.editing.reloading import reloaded
 from hfg.graph.flat import flatten
 from hfg.graph.structure.membership import write_parameter
+from hfg.ports.edges import EventEdge
 from hfg.trace import ParameterSet, StructureChanged
 
 __all__ = ["Edits"]
@@ -267,8 +268,10 @@ class Edits:
         new, nodes = apply(engine.core, self._index, self._graph, how, edit.come, engine.groups)
         for edge, flat in new:
             if flat.source.kind == "observable":
+                assert isinstance(edge, EventEdge)
                 self._lifecycle.streams.feed(flat.source.port, edge, flat.options.through)
             elif flat.options.through:
+                assert isinstance(edge, EventEdge)  # others have no operators (P9)
                 self._lifecycle.streams.pipe(edge, flat.options.through)
         for edge in how.lost:
             self._lifecycle.streams.forget(edge)

@@ -35,7 +35,10 @@ from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.options import NodeOptions
 from hfg.graph.structure.places import edge_place, effective_options, home_of, is_attached, is_in, side_of
 from hfg.graph.structure.subgraph import is_box, iterated
+from hfg.nodetypes.description import NodeType
+from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget
+from hfg.ports.edges import AnyEdge
 from hfg.types import why_not
 
 __all__ = ["PlanDiff", "diff"]
@@ -62,18 +65,18 @@ class PlanDiff(msgspec.Struct, eq=False):
       doubtful: only a check of the whole graph can tell whether it is sound.
     """
 
-    come: dict[Any, NodeOptions] = {}
+    come: dict[Node, NodeOptions] = {}
     gone: list[RunningNode] = []
-    swapped: list[tuple[RunningNode, Any, Any]] = []
+    swapped: list[tuple[RunningNode, Node, Node]] = []
     placed: list[RunningNode] = []
     options: list[tuple[RunningNode, NodeOptions]] = []
     renamed: list[RunningNode] = []
-    boxes_come: dict[Any, NodeOptions] = {}
+    boxes_come: dict[Node, NodeOptions] = {}
     boxes_gone: list[RunningNode] = []
     boxes_placed: list[RunningNode] = []
-    old: list[Any] = []
-    ways: list[tuple[FlatEdge, Any]] = []
-    lost: list[Any] = []
+    old: list[AnyEdge] = []
+    ways: list[tuple[FlatEdge, AnyEdge | None]] = []
+    lost: list[AnyEdge] = []
     gates: bool = False
     touched: list[RunningNode] = []
     doubtful: bool = False
@@ -102,22 +105,22 @@ class _Comparing:
         self.index = index
         self.changes = changes
         self.found = PlanDiff()
-        self.swaps: dict[Any, RunningNode | None] = {}  # by node: the worker that takes it over; None: no longer
+        self.swaps: dict[Node, RunningNode | None] = {}  # by node: the worker that takes it over; None: no longer
         self.insides: list[Level] = []  # of subgraphs that came, went or moved
         self.follower = Follower(graph)
 
     # --- nodes
 
-    def worker_of(self, node: Any) -> RunningNode | None:
+    def worker_of(self, node: Node) -> RunningNode | None:
         """Return the worker that a node has, or takes over."""
         return self.swaps[node] if node in self.swaps else self.index.by_node.get(node)
 
     def nodes(self) -> None:
         """Compare the nodes that changes name, and all inside them."""
         found = self.found
-        swapped: dict[RunningNode, Any] = {}
-        placed: dict[Any, None] = {}
-        told: dict[Any, None] = {}
+        swapped: dict[RunningNode, Node] = {}
+        placed: dict[Node, None] = {}
+        told: dict[Node, None] = {}
         for change in self.changes:
             if isinstance(change, NodeSwap):
                 worker = self.worker_of(change.old)
@@ -143,7 +146,7 @@ class _Comparing:
         ]
         found.gates = any(isinstance(change, GateChange) for change in self.changes)
 
-    def _within(self, node: Any, was: Level | None, levels: list[Level] | None) -> Iterator[Any]:
+    def _within(self, node: Node, was: Level | None, levels: list[Level] | None) -> Iterator[Node]:
         """Yield a node and all inside it; add the inner levels to `levels`."""
         waiting = [(node, was)]
         while waiting:
@@ -156,26 +159,27 @@ class _Comparing:
                 levels.append(level)
             waiting += [(inner, None) for inner in level.nodes.values()]
 
-    def _is_leaf(self, node: Any) -> bool:
+    def _is_leaf(self, node: Node) -> bool:
         worker = self.worker_of(node)
         return not is_box(node) or bool(iterated(node)) or (worker is not None and worker.scope is None)
 
-    def _compare_node(self, node: Any, *, moved: bool) -> None:
+    def _compare_node(self, node: Node, *, moved: bool) -> None:
         found, worker, stays = self.found, self.worker_of(node), is_in(node, self.graph)
         leaf = self._is_leaf(node)
         if not stays:
             if worker is not None:
                 (found.gone if leaf else found.boxes_gone).append(worker)
             return
-        options = effective_options(node)
+        place, options = node._place, effective_options(node)
+        assert place is not None
         self.found.doubtful |= options.group is not None and options.group not in self.graph.groups
         if worker is None:
-            found.doubtful |= node._type.is_source and side_of(level_of(node._place.graph)).owner is not None
+            found.doubtful |= node._type.is_source and side_of(level_of(place.graph)).owner is not None
             (found.come if leaf else found.boxes_come)[node] = options
             return
         if moved:
             (found.placed if leaf else found.boxes_placed).append(worker)
-        if worker.path != node._place.path:
+        if worker.path != place.path:
             found.renamed.append(worker)
         if leaf:
             found.options.append((worker, options))
@@ -186,7 +190,7 @@ class _Comparing:
         """Follow all paths over the declared edges that were touched."""
         index, found = self.index, self.found
         homes, before, rubbed_out = self._touched_edges()
-        affected: dict[Any, None] = {}
+        affected: dict[AnyEdge, None] = {}
         begins: dict[Edge, None] = {}
         for edge, home in homes.items():
             affected |= dict.fromkeys(index.passing.get(edge, ()))
@@ -200,7 +204,7 @@ class _Comparing:
         for begin in begins:
             affected |= dict.fromkeys(index.block(before.get(begin, begin)))
         found.old = sorted(affected, key=index.edges.label)
-        present: dict[Any, list[Any]] = {}
+        present: dict[tuple[object, ...], list[AnyEdge]] = {}
         for running in found.old:
             if rubbed_out.isdisjoint(running.segments):
                 present.setdefault(ends_of_running(running), []).append(running)
@@ -209,9 +213,9 @@ class _Comparing:
         for begin in in_order:
             for way in self.follower.block(begin):
                 same = present.get(self._ends_of(way))
-                running = same.pop(0) if same else None
-                kept.add(running)
-                found.ways.append((way, running))
+                goes_on = same.pop(0) if same else None
+                kept.add(goes_on)
+                found.ways.append((way, goes_on))
         found.lost = [running for running in found.old if running not in kept]
 
     def _touched_edges(self) -> tuple[dict[Edge, Level | None], dict[Edge, Edge], set[Edge]]:
@@ -247,7 +251,7 @@ class _Comparing:
         names = [
             name for name in {**change.before, **change.after} if change.before.get(name) != change.after.get(name)
         ]
-        owner: Any = change.level.owner
+        owner = change.level.owner
         waiting = [owner.ports.parameters[name] for name in names] if owner is not None else []
         while waiting:
             port = waiting.pop()
@@ -261,7 +265,7 @@ class _Comparing:
                 if port in ports and around.owner is not None:
                     waiting.append(around.owner.ports.parameters[name])
 
-    def _ends_of(self, way: FlatEdge) -> tuple[Any, ...]:
+    def _ends_of(self, way: FlatEdge) -> tuple[object, ...]:
         roomy = bool(way.options.initial or way.options.buffer) and not way.is_event_edge  # another class of edge
         source, target = way.source, way.target
         begin, end = self._of_node(source.port) or source.port, self._of_node(target.port) or target.port
@@ -338,7 +342,7 @@ class _Comparing:
             and not any(part.options.first_said("events") for part in way.segments)
         )
 
-    def _are_doubled(self, changes: Sequence[tuple[FlatEdge, Any]]) -> bool:
+    def _are_doubled(self, changes: Sequence[tuple[FlatEdge, AnyEdge | None]]) -> bool:
         """Return whether an input may have two edges, or two ports be connected twice (P2)."""
         into = set()
         moved = {*self.found.lost, *(running for _, running in changes)}  # all others stay
@@ -386,7 +390,7 @@ class _Comparing:
         ]
 
 
-def _may_wait(kind: Any) -> bool:
+def _may_wait(kind: NodeType) -> bool:
     """Return whether nodes of a type have async code."""
     waits = kind.process_kind.startswith("async") or "do" in kind.hooks
     return waits or any(slot.is_async for slot in kind.slots.values())

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from typing import Any
 
 from hfg.engine.model import Core, RunningNode
+from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.sequence import Sequence
-from hfg.ports.edges import EventEdge
+from hfg.nodetypes.node import Node
+from hfg.ports.edges import AnyEdge, EventEdge
 
 __all__ = ["PlanIndex", "TopologicalOrder"]
 
@@ -32,26 +33,26 @@ class PlanIndex:
     """
 
     def __init__(self, core: Core) -> None:
-        self.by_node: dict[Any, RunningNode] = {
+        self.by_node: dict[Node, RunningNode] = {
             worker.node: worker for worker in core.workers if worker.node is not None
         }
         self.leaves = Sequence(worker for worker in core.workers if worker.node is not None and worker.scope is None)
         self.scopes = Sequence(scope.worker for scope in core.scopes if scope.worker is not None)
-        self.edges: Sequence[Any] = Sequence(edge for edge in core.edges if edge.segments)
-        self.passing: dict[Any, list[Any]] = {}
-        self.labels: dict[str, Any] = {}
+        self.edges: Sequence[AnyEdge] = Sequence(edge for edge in core.edges if edge.segments)
+        self.passing: dict[Edge, list[AnyEdge]] = {}
+        self.labels: dict[str, AnyEdge] = {}
         for edge in self.edges.items:
             self.note(edge)
             self.labels[edge.label] = edge
             edge.renumber(self.edges.label(edge))
         self.order = TopologicalOrder(self)
 
-    def note(self, edge: Any) -> None:
+    def note(self, edge: AnyEdge) -> None:
         """Add an edge under its segments."""
         for segment in edge.segments:
             self.passing.setdefault(segment, []).append(edge)
 
-    def forget(self, edge: Any) -> None:
+    def forget(self, edge: AnyEdge) -> None:
         """Remove an edge from under its segments."""
         for segment in edge.segments:
             passing = self.passing[segment]
@@ -59,7 +60,7 @@ class PlanIndex:
             if not passing:
                 del self.passing[segment]
 
-    def block(self, begin: Any) -> list[Any]:
+    def block(self, begin: Edge) -> list[AnyEdge]:
         """Return the running edges that begin with a declared one, in order."""
         return [edge for edge in self.passing.get(begin, ()) if edge.segments[0] is begin]
 
@@ -73,12 +74,12 @@ class TopologicalOrder:
 
     def __init__(self, index: PlanIndex) -> None:
         self._index = index
-        self._nodes: Sequence[Any] | None = None  # made at the first question
-        self._come: dict[Any, list[Any]] = {}  # of the current edit: the nodes that wait for a node, and
-        self._waits: dict[Any, list[Any]] = {}  # the nodes that a node waits for
-        self._lost: set[Any] = set()
+        self._nodes: Sequence[Node] | None = None  # made at the first question
+        self._come: dict[Node, list[Node]] = {}  # of the current edit: the nodes that wait for a node, and
+        self._waits: dict[Node, list[Node]] = {}  # the nodes that a node waits for
+        self._lost: set[AnyEdge] = set()
 
-    def closes_a_ring(self, new: Iterable[tuple[Any, Any]], lost: Iterable[Any]) -> bool:
+    def closes_a_ring(self, new: Iterable[tuple[Node, Node]], lost: Iterable[AnyEdge]) -> bool:
         """Add new edges, as pairs of nodes, while others go; return whether they close a cycle."""
         pairs = list(new)
         if not pairs:
@@ -99,18 +100,18 @@ class TopologicalOrder:
             self._come, self._waits, self._lost = {}, {}, set()
         return False
 
-    def forget(self, node: Any) -> None:
+    def forget(self, node: Node) -> None:
         """Remove a node."""
         if self._nodes is not None and node in self._nodes:
             self._nodes.remove(node)
 
-    def swap(self, old: Any, new: Any) -> None:
+    def swap(self, old: Node, new: Node) -> None:
         """Put a node in the place of another."""
         if self._nodes is not None and old in self._nodes:
             self.forget(new)
             self._nodes.replace(old, new)
 
-    def _take_in(self, nodes: Sequence[Any], source: Any, target: Any) -> bool:
+    def _take_in(self, nodes: Sequence[Node], source: Node, target: Node) -> bool:
         """Let a node come before another; return whether that is possible."""
         if source is target:
             return False
@@ -128,7 +129,7 @@ class TopologicalOrder:
             self._move(nodes, before.found, target, 0)
         return True
 
-    def _move(self, nodes: Sequence[Any], moved: set[Any], beside: Any, offset: int) -> None:
+    def _move(self, nodes: Sequence[Node], moved: set[Node], beside: Node, offset: int) -> None:
         """Put nodes directly after or before another, in their present order."""
         in_order = sorted(moved, key=nodes.label)
         for node in in_order:
@@ -137,18 +138,18 @@ class TopologicalOrder:
         for number, node in enumerate(in_order):
             nodes.insert(position + number, node)
 
-    def _behind(self, node: Any) -> list[Any]:
+    def _behind(self, node: Node) -> list[Node]:
         worker = self._index.by_node.get(node)
         found = [] if worker is None else [edge for edges in worker.wired_out for edge in edges]
         return [edge.target.node for edge in self._joining(found)] + self._come.get(node, [])
 
-    def _before(self, node: Any) -> list[Any]:
+    def _before(self, node: Node) -> list[Node]:
         worker = self._index.by_node.get(node)
         return [edge.source.node for edge in self._joining(worker.in_edges if worker else ())] + self._waits.get(
             node, []
         )
 
-    def _joining(self, edges: Iterable[Any]) -> list[Any]:
+    def _joining(self, edges: Iterable[AnyEdge]) -> list[AnyEdge]:
         return [
             edge
             for edge in edges
@@ -160,16 +161,16 @@ class TopologicalOrder:
             and edge.target.node is not None
         ]
 
-    def _all(self) -> Sequence[Any]:
+    def _all(self) -> Sequence[Node]:
         if self._nodes is None:
             self._nodes = Sequence(self._sorted())
         return self._nodes
 
-    def _sorted(self) -> list[Any]:
+    def _sorted(self) -> list[Node]:
         """Return all nodes, each after those whose outputs it takes (Kahn, 1962)."""
         left = {worker.node: len(self._before(worker.node)) for worker in self._index.leaves.items}
         ready = deque(node for node, count in left.items() if not count)
-        found: list[Any] = []
+        found: list[Node] = []
         while ready:
             node = ready.popleft()
             found.append(node)
@@ -183,7 +184,7 @@ class TopologicalOrder:
 class _Search:
     """Visits nodes along edges, within a limit."""
 
-    def __init__(self, begin: Any, onward: Callable[[Any], list[Any]], may: Callable[[Any], bool]) -> None:
+    def __init__(self, begin: Node, onward: Callable[[Node], list[Node]], may: Callable[[Node], bool]) -> None:
         self.found = {begin}
         self.waiting = [begin]
         self._onward = onward
@@ -193,7 +194,7 @@ class _Search:
         """Return whether there is more to visit."""
         return bool(self.waiting)
 
-    def step(self, wanted: Any) -> bool:
+    def step(self, wanted: Node) -> bool:
         """Visit one node; return whether an edge leads from it to the wanted one."""
         for node in self._onward(self.waiting.pop()):
             if node is wanted:
