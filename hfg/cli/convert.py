@@ -88,7 +88,7 @@ def _import_apex(target: str, out: Path | None, json: bool) -> int:
 
 def _write_schema(file: str | None, allow: Sequence[str]) -> int:
     if allow:
-        import_from_here()
+        import_from_here(last=True)
     try:
         text = schema(types=True, allow=allow)
     except UsageError as error:

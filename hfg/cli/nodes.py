@@ -11,6 +11,8 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
+from importlib import import_module
+from importlib.machinery import PathFinder
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
@@ -115,20 +117,13 @@ def _meant(what: str | None) -> tuple[Catalogue, bool]:
     """Return the matching types, and whether the request names one type."""
     if what is None:
         return catalogue.installed(), False
-    from hfg.cli import target  # imports the graph layer, which a search does without
-
     place, colon, name = what.rpartition(":")
     if colon and not ("/" in name or "\\" in name):
         return _only_named(_in(place), what, name), True
-    target.import_from_here()
-    if (
-        what.endswith(".py")
-        or "/" in what
-        or "\\" in what
-        or Path(what).is_file()
-        or _is_family(what)
-        or _is_module(what)
-    ):
+    if what.endswith(".py") or "/" in what or "\\" in what or Path(what).is_file() or _is_family(what):
+        return _in(what), False
+    # A module from here may have any name, so what is installed goes first, and is imported while none can be.
+    if not _is_installed(what) and _is_module(what):
         return _in(what), False
     found = catalogue.installed()
     try:
@@ -140,9 +135,20 @@ def _meant(what: str | None) -> tuple[Catalogue, bool]:
 
 
 def _in(place: str) -> Catalogue:
-    from hfg.cli import target
+    if _is_family(place):
+        return catalogue.types_of(import_module(f"{_LIBRARY}.{place}"))
+    from hfg.cli import target  # imports the graph layer, which a search does without
 
-    return catalogue.types_of(target.load_module(f"{_LIBRARY}.{place}" if _is_family(place) else place))
+    return catalogue.types_of(target.load_module(place))
+
+
+def _is_installed(name: str) -> bool:
+    """Whether an installed type has this name, as its index says."""
+    return any(_loosely(name) == _loosely(one.title) for one in catalogue.installed_index().index.entries)
+
+
+def _loosely(name: str) -> str:
+    return name.lower().replace("_", "")
 
 
 def _is_family(name: str) -> bool:
@@ -151,8 +157,11 @@ def _is_family(name: str) -> bool:
 
 def _is_module(name: str, *, also_pythons: bool = False) -> bool:
     """Whether a module of this name can be imported; one of Python's own is not what is meant at first."""
-    if not also_pythons and name.partition(".")[0] in sys.stdlib_module_names:
+    top = name.partition(".")[0]
+    if not also_pythons and top in sys.stdlib_module_names:
         return False
+    if top.isidentifier() and PathFinder.find_spec(top, [str(Path.cwd())]) is not None:
+        return True
     try:
         return find_spec(name) is not None
     except (ImportError, ValueError):  # no such package around it, or no name of a module at all

@@ -80,10 +80,10 @@ def _runs_already(target: str) -> list[Answer]:
         return find(target)
     if ":" in target or target.endswith(_CODE) or Path(target).exists() or Path(f"{target}.py").exists():
         return []
-    import_from_here()
     try:
         return find(target)
     except TargetError as error:
+        import_from_here()  # not before: what lies here could stand in for what is imported meanwhile
         top = target.partition(".")[0]
         if top.isidentifier() and importlib.util.find_spec(top) is not None:
             return []

@@ -1,7 +1,8 @@
 """Finds the graph of a TARGET: in a module or Python file, as a graph or a function that builds one, or a graph file.
 
 A target is `module:graph`, `file.py`, `file.py:graph`, `file.hfg.yaml` or `file.apex`. A file or module is imported as
-Python itself would import it. Depends on `arguments`, the files' floor and the graph floor.
+Python itself would import it, except that nothing else is imported from a folder in which every user may put modules,
+such as /tmp (rule L5). Depends on `arguments`, the files' floor and the graph floor.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 
+from hfg.base.sources import is_open_to_all, spec_of_file
 from hfg.cli.arguments import builder_arguments
 from hfg.errors import TargetError, in_words
 from hfg.files import apex, load
@@ -99,7 +101,7 @@ def load_module(place: str) -> ModuleType:
         if error.name is not None and (place + ".").startswith(error.name + "."):
             hint = f"; is {place}.py meant?" if Path(f"{place}.py").exists() else ""
             raise TargetError(f'there is no module "{error.name}" here or installed{hint}') from None
-        raise TargetError(f"importing {place} failed: {in_words(error)}") from error
+        raise TargetError(f"importing {place} failed: {in_words(error)}{_left_out(error, Path.cwd())}") from error
     except Exception as error:
         raise TargetError(f"importing {place} failed: {in_words(error)}") from error
     except SystemExit as error:
@@ -119,11 +121,11 @@ def _load_file(file: Path) -> ModuleType:
         loaded = getattr(sys.modules[name], "__file__", None)
         if loaded is not None and Path(loaded).resolve() == file:
             return sys.modules[name]
-    spec = importlib.util.find_spec(name) if name.isidentifier() and name not in sys.modules else None
+    is_findable = name.isidentifier() and name not in sys.modules and not is_open_to_all(file.parent)
+    spec = importlib.util.find_spec(name) if is_findable else None
     if spec is None or spec.origin is None or Path(spec.origin).resolve() != file:
         # Another module has this name, or it cannot be one. Node types are then not found by name outside this process.
-        spec = importlib.util.spec_from_file_location(f"hfg_target_{abs(hash(file))}", file)
-    assert spec is not None
+        spec = spec_of_file(f"hfg_target_{abs(hash(file))}", file)
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
@@ -137,19 +139,26 @@ def _load_file(file: Path) -> ModuleType:
             ) from error
         if not isinstance(error, Exception):
             raise
-        raise TargetError(f"{file.name} failed: {in_words(error)}") from error
+        raise TargetError(f"{file.name} failed: {in_words(error)}{_left_out(error, file.parent)}") from error
     return module
 
 
-def import_from_here() -> None:
-    """Let what lies in the working directory be imported."""
-    _import_from(Path.cwd())
+def import_from_here(*, last: bool = False) -> None:
+    """Let what lies in the working directory be imported, before what is installed or after it."""
+    _import_from(Path.cwd(), last=last)
 
 
-def _import_from(folder: Path) -> None:
-    """Let the target import its neighbours, as `python file.py` would."""
-    if str(folder) not in sys.path:
-        sys.path.insert(0, str(folder))
+def _import_from(folder: Path, *, last: bool = False) -> None:
+    """Let the target import its neighbours, as `python file.py` would, unless another user can have put them there."""
+    if str(folder) not in sys.path and not is_open_to_all(folder):
+        sys.path.insert(len(sys.path) if last else 0, str(folder))
+
+
+def _left_out(error: BaseException, folder: Path) -> str:
+    """Say why a module is not found that lies in a folder."""
+    if not isinstance(error, ModuleNotFoundError) or not is_open_to_all(folder):
+        return ""
+    return f"; no module is imported from {folder}, as every user may put some there: move it into a folder of yours"
 
 
 def _split(target: str) -> tuple[str, str]:

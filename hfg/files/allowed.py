@@ -18,6 +18,7 @@ from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Final
 
+from hfg.base.sources import is_open_to_all
 from hfg.encoding import is_data_type
 from hfg.files import boxes
 from hfg.graph.structure.operators import OperatorFunction
@@ -34,10 +35,12 @@ _PLAIN: Final = (bool, int, float, complex, str, bytes, list, tuple, dict, set, 
 def project_of(file: Path) -> Path:
     """Return the folder that a file's modules and included files lie in.
 
-    The nearest one upwards with a pyproject.toml, else the file's own.
+    The nearest one upwards with a pyproject.toml, else the file's own. In a folder like /tmp, another user can have put
+    one there.
     """
     folder = file.resolve().parent
-    return next((one for one in (folder, *folder.parents) if (one / _MARK).is_file()), folder)
+    around = (one for one in (folder, *folder.parents) if (one / _MARK).is_file() and not is_open_to_all(one))
+    return next(around, folder)
 
 
 @functools.cache
@@ -98,6 +101,11 @@ class Allowed:
         spec, folder = _spec(top), None
         if spec is None:
             folder = self._folder_of(top)
+        if folder is not None and is_open_to_all(folder):
+            return (
+                f'module "{module}" would come from {_place(None, folder, top)}, and every user may put modules into '
+                "that folder; move the file and its modules into a folder of yours"
+            )
         if _is_in(module, self._extra):
             if folder is not None:
                 sys.path.append(str(folder))

@@ -24,6 +24,7 @@ from typing import Final
 
 import msgspec
 
+from hfg.base.sources import spec_of_file
 from hfg.engine import PunctualLoop
 from hfg.errors import HfgError, RunError, TransportError, in_words
 from hfg.graph import Graph
@@ -182,10 +183,10 @@ def _be_like(main: str) -> None:
 
 def _import_as(name: str, file: str) -> None:
     """Import a file under the name that it has in the main part."""
-    spec = importlib.util.spec_from_file_location(name, file)
-    if spec is not None and spec.loader is not None:
-        sys.modules[name] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
+    spec = spec_of_file(name, file)
+    assert spec.loader is not None
+    sys.modules[name] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
 
 
 if __name__ == "__main__":
