@@ -17,7 +17,7 @@ from hfg.encoding.plain import json_value
 from hfg.nodes.activity import Wait
 from hfg.nodes.files.reading import json_of, read_bytes
 from hfg.recording import File
-from hfg.recording.chunks import content_of
+from hfg.recording.chunks import Budget, content_of
 from tests.attacks.fuzzing import KINDS
 from tests.limits import patience
 
@@ -80,6 +80,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "HFG_MOST_JSON_VALUES": lambda folder: json_of(b"[1,2,3,4,5,6,7,8,9]", "it"),
     "HFG_MOST_NODES_AND_PORTS": _ports,
     "HFG_MOST_PICTURE_PIXELS": lambda folder: need_fair_size(KINDS["picture"].samples()[0], "it"),
+    "HFG_MOST_RECORDING_RATIO": lambda folder: Budget(1000).spend(0, 2**33),
 }
 
 

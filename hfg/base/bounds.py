@@ -46,6 +46,9 @@ NODES_AND_PORTS: Final = Bound(
     "HFG_MOST_NODES_AND_PORTS", 100_000, "nodes of included files, and nodes and ports that copies and vectors make"
 )
 PICTURE_PIXELS: Final = Bound("HFG_MOST_PICTURE_PIXELS", 2**27, "pixels of one image or video frame")
+RECORDING_RATIO: Final = Bound(
+    "HFG_MOST_RECORDING_RATIO", 100, "bytes of a recording, unpacked, for each byte of its file, beyond the first 4 GiB"
+)
 
 BOUNDS: Final = (
     ACTIVE_EDGES,
@@ -56,4 +59,5 @@ BOUNDS: Final = (
     JSON_VALUES,
     NODES_AND_PORTS,
     PICTURE_PIXELS,
+    RECORDING_RATIO,
 )

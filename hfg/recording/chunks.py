@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import lz4.frame  # type: ignore[import-untyped]
 import zstandard
 
-from hfg.base.bounds import CHUNK_BYTES, CHUNK_MESSAGES
+from hfg.base.bounds import CHUNK_BYTES, CHUNK_MESSAGES, RECORDING_RATIO
 
 HEAD: Final = struct.Struct("<BQ")
 """The head of each record: its kind and its length."""
@@ -25,6 +25,8 @@ SCHEMA, CHANNEL, MESSAGE, CHUNK = 3, 4, 5, 6
 _MESSAGE: Final = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _BEFORE: Final = struct.Struct("<QQQII")  # times, size and checksum unpacked, length of the compression's name
 _BLOCK: Final = 2**20
+_ALWAYS_BYTES: Final = 4 * 2**30
+_MESSAGE_BYTES: Final = 512  # that take as long to unpack as a message takes to be looked at
 
 
 class Damaged(Exception):
@@ -188,3 +190,39 @@ def content_of(data: bytes, declare: Callable[[int, bytes], None]) -> Content:
         elif opcode in (SCHEMA, CHANNEL):
             declare(opcode, data[begin:at])
     return Content(data, places)
+
+
+class Budget:
+    """What all chunks of a file may cost together: each may be within its limits, and there may be thousands.
+
+    Args:
+      size: bytes of the file.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self._spent: dict[int, int] = {}  # by number of the chunk
+        self._sum = 0
+
+    def spend(self, number: int, unpacked: int, messages: int = 0) -> None:
+        """Count a chunk, however often it is read.
+
+        Args:
+          number: its place in the file.
+          unpacked: its bytes.
+          messages: how many are in it, if that is known.
+
+        Raises:
+          Damaged: it would cost more than is left.
+        """
+        before = self._spent.get(number, 0)
+        more = unpacked + _MESSAGE_BYTES * messages - before
+        if more <= 0:
+            return
+        if self._sum + more > _ALWAYS_BYTES + RECORDING_RATIO.most * self._size:
+            raise Damaged(
+                f"the chunks together unpack to more than {_ALWAYS_BYTES:,} bytes, each message counted as "
+                f"{_MESSAGE_BYTES} more; beyond that, for each byte of the file {RECORDING_RATIO.remedy}"
+            )
+        self._spent[number] = before + more
+        self._sum += more

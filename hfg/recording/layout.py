@@ -97,6 +97,7 @@ class Layout:
     """The positions of everything in a file.
 
     Attributes:
+      size: bytes of the file.
       whole: the file is complete up to its end, and so is its summary.
       ended: the recording ended here; the summary may be damaged.
       pieces: places of messages, in order.
@@ -111,7 +112,7 @@ class Layout:
 
     def __init__(self, stream: BinaryIO, size: int) -> None:
         self._stream = stream
-        self._size = size
+        self.size = size
         self.whole = self.ended = False
         self.pieces: list[Piece] = []
         self.library = self.profile = ""
@@ -133,14 +134,14 @@ class Layout:
 
     def _read_summary(self) -> int | None:
         """Read the summary, if there is one that is not damaged. Return its position."""
-        if self._size < _FOOTER + len(MAGIC):
+        if self.size < _FOOTER + len(MAGIC):
             return None
-        tail = self._at(self._size - _FOOTER, _FOOTER)
+        tail = self._at(self.size - _FOOTER, _FOOTER)
         opcode, length = HEAD.unpack_from(tail)
         if not tail.endswith(MAGIC) or opcode != Opcode.FOOTER or length != 20:
             return None
         footer = read_record(opcode, tail[HEAD.size : -len(MAGIC)])
-        at, end = footer.summary_start, self._size - _FOOTER
+        at, end = footer.summary_start, self.size - _FOOTER
         if at == 0:  # there is none, which is allowed
             self.whole = self._checks(tail, footer.summary_crc)
             return None
@@ -177,7 +178,7 @@ class Layout:
 
     def _take_index(self, record: ChunkIndex) -> None:
         at, length = record.chunk_start_offset, record.chunk_length
-        if at < len(MAGIC) or length < HEAD.size or at + length > self._size:
+        if at < len(MAGIC) or length < HEAD.size or at + length > self.size:
             raise Damaged("it lists a chunk that is not in the file")
         self._indexed[at] = record
 
@@ -307,7 +308,7 @@ class Layout:
             return found
         places = sorted(known.message_index_offsets.items(), key=lambda item: item[1])
         ends = [*(at for _, at in places[1:]), places[0][1] + known.message_index_length]
-        if piece.end != places[0][1] or ends[-1] > self._size:
+        if piece.end != places[0][1] or ends[-1] > self.size:
             return {}  # the summary contradicts itself
         return {
             channel: (at + HEAD.size, end - at - HEAD.size)
@@ -319,7 +320,7 @@ class Layout:
         """Yield positions and lengths of the index records after a chunk."""
         while True:
             try:
-                opcode, length = self._head(at, self._size)
+                opcode, length = self._head(at, self.size)
             except Damaged:
                 return
             if opcode != Opcode.MESSAGE_INDEX:

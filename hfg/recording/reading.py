@@ -17,7 +17,7 @@ from mcap.records import Channel, Schema
 
 from hfg.encoding.plain import json_value
 from hfg.errors import UsageError
-from hfg.recording.chunks import Content, Damaged, content_of, unpacked
+from hfg.recording.chunks import Budget, Content, Damaged, content_of, unpacked
 from hfg.recording.layout import Layout, read_record
 from hfg.recording.mcap import MAGIC
 from hfg.recording.messages import EVENTS, MARKERS
@@ -152,6 +152,7 @@ class File:
         except BaseException:
             self._stream.close()
             raise
+        self._budget = Budget(self.layout.size)
         self.whole = self.layout.whole
         self.library = self.layout.library
         self.channels: dict[int, Channel] = self.layout.channels
@@ -159,7 +160,7 @@ class File:
         self.metadata: dict[str, dict[str, str]] = self.layout.metadata
         if self.layout.statistics is None:  # chunks may contain declarations
             for number in range(len(self.layout.pieces)):
-                self._content(number)
+                self.content(number)
 
     def close(self) -> None:
         """Close the file."""
@@ -174,7 +175,7 @@ class File:
     def contents(self) -> Iterator[Content]:
         """Yield the chunks that can be read."""
         for number in range(len(self.layout.pieces)):
-            content = self._content(number)
+            content = self.content(number)
             if content is not None:
                 yield content
 
@@ -280,9 +281,13 @@ class File:
         faults = [Loss(f"at byte {at:,}: {why}") for at, why in self.layout.faults]
         if faults and not self.layout.ended:
             faults[-1].messages = None
-        found = self._recovered() + faults[-_MOST_TOLD:] + [self._lost[one] for one in sorted(self._lost)]
+        chunks = [self._lost[one] for one in sorted(self._lost)]
+        found = self._recovered() + faults[-_MOST_TOLD:] + chunks[:_MOST_TOLD]
         if len(faults) > _MOST_TOLD:
             found.append(Loss(f"{len(faults) - _MOST_TOLD} more places are damaged"))
+        if more := [one.messages for one in chunks[_MOST_TOLD:]]:
+            count = None if None in more else sum(one or 0 for one in more)
+            found.append(Loss(f"{len(more):,} more chunks cannot be read", count))
         return found
 
     def _losses(self, seen: _Seen) -> list[Loss]:
@@ -308,7 +313,7 @@ class File:
         except (msgspec.DecodeError, RecursionError):
             return [Loss("the list of losses from before it was recovered cannot be read", None)]
 
-    def _content(self, number: int) -> Content | None:
+    def content(self, number: int) -> Content | None:
         """Read a chunk. Return None if it cannot be read, and record the loss."""
         if number in self._lost:
             return None
@@ -321,6 +326,7 @@ class File:
             return None
         try:
             content = content_of(data, self._declare)
+            self._budget.spend(number, len(data), len(content.places) // 2)
         except Damaged as error:
             self.lose(number, str(error))
             return None
@@ -338,10 +344,12 @@ class File:
         piece = self.layout.pieces[number]
         try:
             record = self.layout.content(piece.begin, piece.length)
-            return unpacked(record) if piece.is_chunk else record
+            data = unpacked(record) if piece.is_chunk else record
+            self._budget.spend(number, len(data))
         except Damaged as error:
             self.lose(number, str(error))
             return None
+        return data
 
     def lose(self, number: int, why: str = "") -> Loss:
         """Record that a piece cannot be read, unless that is known already; return what is lost."""

@@ -18,7 +18,7 @@ from typing import Any, Final, Generic, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from hfg.recording.chunks import HEAD, MESSAGE, Damaged, content_of
+from hfg.recording.chunks import HEAD, MESSAGE, Damaged
 from hfg.recording.reading import File, Loss
 
 T = TypeVar("T")
@@ -149,15 +149,10 @@ class Seeking:
 
     def _listed(self, number: int) -> dict[int, Array]:
         """Make the lists of a piece that has none."""
-        data = self.file.unpacked(number)
-        if data is None:
-            return {}
-        try:
-            places = content_of(data, lambda _opcode, _data: None).places
-        except Damaged:
+        content = self.file.content(number)
+        if content is None or not content.places:
             return {}  # whatever is read from it later reports the damage
-        if not places:
-            return {}
+        data, places = content
         # a small file may hold millions of empty messages: objects of Python for each would take gigabytes
         begins = np.frombuffer(places, np.uint64)[::2].astype(np.int64)
         channels = _numbers_at(data, begins, "<u2")
