@@ -22,7 +22,7 @@ if sys.platform != "win32":
 
 _PEER: Final = struct.Struct("3i")  # process, user and group of who is at the other end
 _OTHERS: Final = 0o077
-_MOST_LINKS: Final = 40  # that Linux follows on one way
+MOST_LINKS: Final = 40  # that Linux follows on one way
 
 
 def _machine() -> str:
@@ -148,21 +148,35 @@ def check_parents(folder: Path, purpose: str = MEETING) -> None:
     Raises:
       TransportError: another user can.
     """
-    for place in way_to(folder.absolute()):
-        try:
-            found = place.lstat()
-        except OSError:
-            continue  # opening the folder fails, or it is created
-        may_be_written = not stat.S_ISLNK(found.st_mode) and (
-            found.st_mode & stat.S_IWOTH or (found.st_mode & stat.S_IWGRP and not _is_own_group(found.st_gid))
-        )
-        is_replaceable = may_be_written and not found.st_mode & stat.S_ISVTX
-        if found.st_uid in (0, os.geteuid()) and not is_replaceable:
-            continue
+    place = unsafe_place(folder)
+    if place is not None:
         raise TransportError(
             f"{folder}, {purpose}, is not safe: other users can replace folders in {place}; write chmod go-w {place}, "
             "or name another place by XDG_STATE_HOME (TMPDIR for the folders of runs)"
         )
+
+
+def unsafe_place(path: Path) -> Path | None:
+    """Return where on the way to a file or folder another user can replace something; None if nowhere."""
+    if not hasattr(os, "geteuid"):
+        return None
+    for place in way_to(path.absolute()):
+        try:
+            found = place.lstat()
+        except OSError:
+            continue  # opening the folder fails, or it is created
+        may_be_written = not stat.S_ISLNK(found.st_mode) and is_open_to_others(found)
+        is_replaceable = may_be_written and not found.st_mode & stat.S_ISVTX
+        if found.st_uid not in (0, os.geteuid()) or is_replaceable:
+            return place
+    return None
+
+
+def is_open_to_others(found: os.stat_result) -> bool:
+    """Say whether others than the owner may write to a file or folder."""
+    if not hasattr(os, "geteuid"):
+        return False
+    return bool(found.st_mode & stat.S_IWOTH or (found.st_mode & stat.S_IWGRP and not _is_own_group(found.st_gid)))
 
 
 def way_to(folder: Path) -> list[Path]:
@@ -187,7 +201,7 @@ def way_to(folder: Path) -> list[Path]:
             continue
         links += 1
         passed.append(here / name)
-        if links > _MOST_LINKS:
+        if links > MOST_LINKS:
             return passed  # opening it fails
         ahead += reversed(target.parts)
         if target.is_absolute():
@@ -211,7 +225,7 @@ def _is_own_group(group: int) -> bool:
 
 def may_be_changed(found: os.stat_result) -> bool:
     """Say whether other users can change a file."""
-    return hasattr(os, "geteuid") and (found.st_uid not in (0, os.geteuid()) or bool(found.st_mode & 0o022))
+    return hasattr(os, "geteuid") and (found.st_uid not in (0, os.geteuid()) or is_open_to_others(found))
 
 
 def exposure_of_key(file: Path | str, found: os.stat_result) -> tuple[str, str] | None:

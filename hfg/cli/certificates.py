@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
+from hfg.base.private import unsafe_place
 from hfg.errors import TargetError
 
 if TYPE_CHECKING:
@@ -161,6 +162,7 @@ def _authority(folder: Path) -> tuple[x509.Certificate, EllipticCurvePrivateKey]
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
     certificate, key = (folder / f"{AUTHORITY}.{ending}" for ending in ("pem", "key"))
+    need_safe(key)
     try:
         made = x509.load_pem_x509_certificate(certificate.read_bytes())
         loaded = load_pem_private_key(key.read_bytes(), None)
@@ -177,6 +179,19 @@ def _authority(folder: Path) -> tuple[x509.Certificate, EllipticCurvePrivateKey]
     return made, loaded
 
 
+def need_safe(file: Path) -> None:
+    """Refuse to keep a key where another user can put one of his in its place.
+
+    Raises:
+      TargetError: he can.
+    """
+    place = unsafe_place(file)
+    if place is not None:
+        raise TargetError(
+            f"{file}: no place for keys, because other users can replace what lies in {place}: take a folder of yours"
+        )
+
+
 def _refuse_to_overwrite(folder: Path, name: str) -> None:
     for ending in ("pem", "key"):
         file = folder / f"{name}.{ending}"
@@ -191,6 +206,7 @@ def _write(folder: Path, name: str, certificate: x509.Certificate, key: Elliptic
     secret = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        need_safe(folder / name)
         for file, content, mode in (
             (folder / f"{name}.key", secret, 0o600),
             (folder / f"{name}.pem", certificate.public_bytes(Encoding.PEM), 0o644),

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from hfg.cli import show
-from hfg.cli.certificates import AUTHORITY, Kind, make_authority, make_certificate
+from hfg.cli.certificates import AUTHORITY, Kind, make_authority, make_certificate, need_safe
 from hfg.errors import TargetError
 
 verbs = typer.Typer()
@@ -41,6 +41,7 @@ def keys() -> None:
 @verbs.command("secret")
 def _secret(file: Annotated[Path, typer.Argument(help="the file to create; it must not exist")]) -> int:
     """Create a secret shared by all programs of a realm, instead of certificates: key = "..." in settings."""
+    need_safe(file)
     try:
         with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as stream:
             stream.write(secrets.token_hex(32) + "\n")

@@ -19,8 +19,9 @@ import uvicorn
 
 from hfg.base.logs import Log
 from hfg.base.loopback import OwnListener
+from hfg.base.private import exposure_of_key
 from hfg.errors import TargetError
-from hfg.studio.cookies import forget_secret, secret_of_port
+from hfg.studio.cookies import forget_secret, secret_of
 from hfg.studio.crowding import CrowdedListener, bounded_http
 from hfg.studio.discreet import DiscreetWebSocket
 from hfg.studio.entrance import Entrance, is_loopback, need_guarded
@@ -98,12 +99,14 @@ class Server:
         """Take the port.
 
         Raises:
-          TargetError: it is in use, or other machines would come in unencrypted.
+          TargetError: it is in use, other machines would come in unencrypted, or others know the key.
         """
         encrypted = certfile is not None
         need_guarded(host, encrypted=encrypted, insecure=insecure)
+        if certfile is not None:
+            _need_secret(keyfile or certfile)
         self._sockets = _listening(host, port)
-        self._port = port = int(self._sockets[0].getsockname()[1])
+        port = int(self._sockets[0].getsockname()[1])
         if sys.platform == "linux" and any(
             isinstance(one, OwnListener) and not one.is_guarded for one in self._sockets
         ):
@@ -114,9 +117,10 @@ class Server:
             )
         shown = socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
         names = () if shown == host else (shown,)
-        self.entrance = Entrance(
-            host, port, encrypted=encrypted, names=names, embedded=embedded, secret=secret_of_port(port)
-        )
+        # A cookie that the network may have heard opens no other server.
+        self._kept = f"{port}-tls" if encrypted else f"{port}" if is_loopback(host) else ""
+        secret = secret_of(self._kept) if self._kept else None
+        self.entrance = Entrance(host, port, encrypted=encrypted, names=names, embedded=embedded, secret=secret)
         self.address = f"{'https' if encrypted else 'http'}://{shown}:{port}/?token={self.entrance.token}"
         app = application(door, self.entrance, Path(os.environ.get("HFG_STUDIO_STATIC") or STATIC))
         self._server = uvicorn.Server(_config(app, self._sockets, certfile, keyfile))
@@ -137,7 +141,22 @@ class Server:
         await asyncio.to_thread(self._thread.join, 3.0)
         for one in self._sockets:
             one.close()
-        forget_secret(self._port)
+        if self._kept:
+            forget_secret(self._kept)
+
+
+def _need_secret(keyfile: str) -> None:
+    """Check that no other user knows the key of a certificate.
+
+    Raises:
+      TargetError: one does, or there is no such file.
+    """
+    try:
+        exposure = exposure_of_key(keyfile, Path(keyfile).stat())
+    except OSError as error:
+        raise TargetError(f"{keyfile} cannot be read: {error.strerror}; correct --keyfile") from None
+    if exposure is not None:
+        raise TargetError(f"--keyfile: {'; '.join(exposure)}")
 
 
 def _config(app: Any, sockets: list[socket.socket], certfile: str | None, keyfile: str | None) -> uvicorn.Config:

@@ -11,11 +11,13 @@ import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
 
 from hfg.base.loopback import OwnListener
+from hfg.cli.certificates import make_authority, make_certificate
 from hfg.errors import TargetError
 from hfg.studio.messages import SUBPROTOCOL
 from hfg.studio.serving import Server, StudioDoor
@@ -251,5 +253,48 @@ def test_a_studio_finds_a_port_although_all_usual_ones_are_taken(monkeypatch: py
             server.start()
             assert urlsplit(server.address).port not in (port, 0)
             await server.stop()
+
+    live(main)
+
+
+@pytest.fixture
+def certificate(tmp_path: Path) -> dict[str, Any]:
+    make_authority(tmp_path, days=1)
+    make_certificate(tmp_path, "here", "agent", hosts=["localhost"], days=1)
+    return {"certfile": str(tmp_path / "here.pem"), "keyfile": str(tmp_path / "here.key")}
+
+
+def test_a_certificate_whose_key_others_know_is_refused(certificate: dict[str, Any]) -> None:
+    """Whoever has the key can pose as the studio, and is given the token."""
+    Path(certificate["keyfile"]).chmod(0o644)
+
+    async def main() -> None:
+        door = StudioDoor(asyncio.get_running_loop(), studio_of(doubling()))
+        with pytest.raises(TargetError, match=r"--keyfile: other users can read or change .*here.key; write chmod 600"):
+            Server(door, **certificate)
+        with pytest.raises(TargetError, match="nowhere.key cannot be read: No such file or directory; correct"):
+            Server(door, certfile=certificate["certfile"], keyfile="nowhere.key")
+
+    live(main)
+
+
+def test_a_cookie_that_the_network_has_heard_opens_no_other_studio(certificate: dict[str, Any]) -> None:
+    """One that is killed leaves its cookie to the next one at its port."""
+
+    async def main() -> None:
+        door = StudioDoor(asyncio.get_running_loop(), studio_of(doubling()))
+        cookies = []
+        with socket.socket() as one:
+            one.bind(("127.0.0.1", 0))
+            port = one.getsockname()[1]
+        how: dict[str, Any]
+        for how in ({"host": "0.0.0.0", "insecure": True}, {"host": "0.0.0.0", **certificate}, {}) * 2:
+            server = Server(door, port=port, **how)
+            cookies.append(server.entrance.set_cookie.partition(";")[0])
+            for listening in server._sockets:  # it is killed
+                listening.close()
+        open_1, encrypted_1, here_1, open_2, encrypted_2, here_2 = cookies
+        assert (encrypted_1, here_1) == (encrypted_2, here_2), "pages come back by themselves"
+        assert len({open_1, open_2, encrypted_1, here_1}) == 4
 
     live(main)

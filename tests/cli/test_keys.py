@@ -97,3 +97,18 @@ def test_without_cryptography_the_remedy_is_named(command: Command, monkeypatch:
     shown = command("keys", "new", "keys")
     assert shown.code == 2
     assert "making keys needs the package cryptography; pip install 'hfg[zenoh]'" in shown.err
+
+
+@pytest.mark.rule("L5")
+@pytest.mark.parametrize("verb", [["secret", "shared/cell.key"], ["new", "shared/keys"], ["add", "shared/old", "arm"]])
+def test_keys_are_not_kept_where_another_user_can_replace_them(
+    command: Command, tmp_path: Path, verb: list[str]
+) -> None:
+    """He would put an authority of his own in the place of ours, and then be whoever he likes."""
+    shared = tmp_path / "shared"
+    command("keys", "new", "shared/old")
+    shared.chmod(0o777)
+    shown = command("keys", *verb)
+    assert shown.code == 2
+    assert f"no place for keys, because other users can replace what lies in {shared}" in shown.err
+    assert {file.name for file in shared.rglob("*") if file.is_file()} == ALL

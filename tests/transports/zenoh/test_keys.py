@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 
 from hfg.cli import main
+from hfg.cli.certificates import make_authority, make_certificate
 from hfg.errors import TransportError
 from hfg.transport import Traffic
-from hfg_transports.zenoh import ZenohTransport
+from hfg_transports.zenoh import Tls, ZenohTransport
 from tests.transports.zenoh.conftest import Open, free_port, into, put_until, soon
 
 pytestmark = [pytest.mark.rule("L5"), pytest.mark.asyncio]
@@ -90,6 +91,29 @@ async def test_a_key_that_proves_nothing_is_refused(
         file.chmod(mode)
     with pytest.raises(TransportError, match=sentence):
         await ZenohTransport().open(mode="router", listen=(address,), key=str(file))
+
+
+async def test_a_key_that_another_user_can_replace_is_refused(key: str, address: str) -> None:
+    folder = Path(key).parent
+    before = folder.stat().st_mode
+    folder.chmod(0o777)
+    try:
+        with pytest.raises(TransportError, match=f"other users can replace what lies in {folder}, and so {key}"):
+            await ZenohTransport().open(mode="router", listen=(address,), key=key)
+    finally:
+        folder.chmod(before & 0o777)
+
+
+async def test_a_certificate_that_another_user_can_replace_is_refused(tmp_path: Path, address: str) -> None:
+    """Zenoh reads the files when it connects, which is after they were looked at."""
+    folder = tmp_path / "keys"
+    make_authority(folder, days=1)
+    make_certificate(folder, "agent", "agent", hosts=["127.0.0.1"], days=1)
+    folder.chmod(0o777)
+    authority, certificate, own = (str(folder / name) for name in ("authority.pem", "agent.pem", "agent.key"))
+    tls = Tls(authority=authority, certificate=certificate, key=own)
+    with pytest.raises(TransportError, match=f"tls.authority: other users can replace what lies in {folder}, and so"):
+        await ZenohTransport().open(mode="router", listen=(address,), tls=tls)
 
 
 async def test_a_key_is_never_overwritten(key: str, capsys: pytest.CaptureFixture[str]) -> None:

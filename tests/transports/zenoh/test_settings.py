@@ -176,6 +176,18 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         read_settings(tmp_path / "latin.toml")
 
 
+@pytest.mark.rule("L5")
+def test_settings_that_other_users_can_change_are_refused(tmp_path: Path) -> None:
+    """They could add an address, and insecure = true."""
+    file = tmp_path / "hfg.toml"
+    file.write_text('realm = "cell"\n')
+    file.chmod(0o666)
+    with pytest.raises(FileError, match=f"other users can change it, .*; write chmod go-w {file}"):
+        read_settings(file)
+    file.chmod(0o644)
+    assert read_settings(file).realm == "cell"
+
+
 def test_whoever_says_so_listens_to_everybody() -> None:
     assert not problems_of(Settings(listen=("tcp/0.0.0.0:7447",), insecure=True))
 

@@ -13,7 +13,7 @@ import ssl
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from hfg.base.private import exposure_of_key, may_be_changed
+from hfg.base.private import exposure_of_key, may_be_changed, unsafe_place
 from hfg_transports.zenoh.keys import authority_of_key
 from hfg_transports.zenoh.settings import Tls
 
@@ -51,6 +51,11 @@ def files_that_do_not_fit(tls: Tls) -> Reason | None:
             return Reason(f"tls.{name}: {file} cannot be read: {error.strerror}", f"correct the path, or {_NEW_KEYS}")
         if name == "key" and (exposure := exposure_of_key(file, found)):
             return Reason(f"tls.key: {exposure[0]}", exposure[1])
+        if (place := unsafe_place(file)) is not None:
+            return Reason(
+                f"tls.{name}: other users can replace what lies in {place}, and so {file}",
+                "move it to a folder of yours",
+            )
         if name == "authority" and may_be_changed(found):
             return Reason(
                 f"tls.authority: other users can change {file}, and so decide whom this program trusts",

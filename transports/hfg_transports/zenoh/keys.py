@@ -14,7 +14,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from hfg.base.private import exposure_of_key
+from hfg.base.private import exposure_of_key, unsafe_place
 from hfg.errors import TransportError
 
 if TYPE_CHECKING:
@@ -49,6 +49,10 @@ def key_of(file: str) -> bytes:
         ) from None
     if exposure := exposure_of_key(file, found):
         raise TransportError(f"key: {'; '.join(exposure)}")
+    if (place := unsafe_place(Path(file))) is not None:
+        raise TransportError(
+            f"key: other users can replace what lies in {place}, and so {file}; move it to a folder of yours"
+        )
     if len(key) < SHORTEST:
         raise TransportError(f"key: {file} has {len(key)} bytes, and at least {SHORTEST} are needed; {_MAKE_ONE}")
     return key

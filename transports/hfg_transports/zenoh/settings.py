@@ -23,6 +23,7 @@ and nothing leaves this computer. Depends on errors and problems; does not depen
 from __future__ import annotations
 
 import difflib
+import os
 import re
 import socket
 import tomllib
@@ -32,6 +33,7 @@ from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
 
+from hfg.base.private import is_open_to_others
 from hfg.errors import FileError, Problem
 
 Mode: TypeAlias = Literal["router", "peer", "client"]
@@ -136,13 +138,18 @@ def read_settings(file: Path | str) -> Settings:
     """
     file = Path(file)
     try:
-        text = file.read_text(encoding="utf-8")
+        with file.open(encoding="utf-8") as stream:
+            status = os.fstat(stream.fileno())
+            text = stream.read()
     except OSError as error:
         raise _refused(
             file, [_problem("", f"it cannot be read: {error.strerror}", "name a file that is there")]
         ) from None
     except UnicodeDecodeError as error:
         raise _refused(file, [_problem("", f"it is no UTF-8 at byte {error.start}", "save it as UTF-8")]) from None
+    if is_open_to_others(status):
+        what = "other users can change it, and so decide who may connect to this computer"
+        raise _refused(file, [_problem("", what, f"write chmod go-w {file}")])
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
