@@ -14,8 +14,6 @@ from types import CodeType
 
 from typing_extensions import override
 
-__all__ = ["is_open_to_all", "spec_of_file"]
-
 
 class _FromText(SourceFileLoader):
     """Neither reads nor writes bytecode."""

@@ -16,6 +16,7 @@ import pytest
 
 import hfg
 from hfg.base import whole
+from hfg.base.places import Place
 from hfg.base.whole import GrowingFile, need_writable, read_plain, write_whole
 from hfg.cli.completing import targets
 from hfg.errors import FileError, SharedMemoryError, UsageError
@@ -131,16 +132,13 @@ def test_nothing_is_written_into_a_file_that_another_user_has_put_into_a_shared_
 
 def comes_after_the_check(monkeypatch: pytest.MonkeyPatch, puts: Callable[[], object]) -> None:
     """Another user tries all the time, so that at some point he comes between a check and what was checked for."""
-    check, has_come = whole.need_trusted, False
 
-    def checks(path: Path) -> None:
-        nonlocal has_come
-        check(path)
-        if not has_come:
-            has_come = True
+    class Attacked(Place):
+        def __init__(self, path: Path) -> None:
+            super().__init__(path)
             as_nobody(puts)
 
-    monkeypatch.setattr(whole, "need_trusted", checks)
+    monkeypatch.setattr(whole, "Place", Attacked)
 
 
 @only_root
@@ -158,10 +156,10 @@ def test_no_pipe_that_another_user_listens_at_is_told_anything(shared: Path, mon
     comes_after_the_check(monkeypatch, lambda: os.mkfifo(shared / "one"))
     opened, listening = os.open, []
 
-    def opens_while_he_listens(path: str, flags: int, mode: int = 0o777) -> int:
-        if path == str(shared / "one"):
-            listening.append(opened(path, os.O_RDONLY | os.O_NONBLOCK))
-        return opened(path, flags, mode)
+    def opens_while_he_listens(path: str, flags: int, mode: int = 0o777, *, dir_fd: int | None = None) -> int:
+        if path == "one" and flags & os.O_WRONLY:
+            listening.append(opened(shared / "one", os.O_RDONLY | os.O_NONBLOCK))
+        return opened(path, flags, mode, dir_fd=dir_fd)
 
     monkeypatch.setattr(os, "open", opens_while_he_listens)
     with pytest.raises(PermissionError, match="a pipe of another user is in its place"):
@@ -182,6 +180,69 @@ def test_nothing_is_written_into_a_file_that_another_user_puts_there_after_the_c
     assert (shared / "one").read_text() == "theirs"
 
 
+@pytest.fixture
+def theirs() -> Iterator[Path]:
+    """A folder in which another user may do everything, and in which we write."""
+    folder = Path(tempfile.mkdtemp(prefix="hfg-attack-", dir="/tmp"))
+    folder.chmod(0o777)
+    os.chown(folder, NOBODY, NOBODY)
+    yield folder
+    shutil.rmtree(folder)
+
+
+@pytest.fixture
+def astray(theirs: Path, precious: Path) -> Callable[[], None]:
+    """What another user does to lead us from his folder into ours, which has a file of the same name."""
+    (theirs / "out").mkdir()
+    (theirs / "out").chmod(0o777)
+    (theirs / "out" / "precious").write_text("theirs")
+
+    def exchanges() -> None:
+        (theirs / "out").rename(theirs / "moved")
+        (theirs / "out").symlink_to(precious.parent)
+
+    return exchanges
+
+
+@only_root
+@pytest.mark.parametrize("name", sorted(WRITES.keys() - {"a page, later", "a recording"}))
+def test_what_was_checked_is_written_to_although_the_way_leads_elsewhere_by_then(
+    theirs: Path, precious: Path, astray: Callable[[], None], monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    comes_after_the_check(monkeypatch, astray)
+    made: Any = WRITES[name](theirs / "out" / "precious")
+    if made is not None:
+        (made.complete if isinstance(made, GrowingFile) else made.close)()
+    assert precious.read_text() == "precious"
+    assert [one.name for one in precious.parent.iterdir()] == ["precious"]
+    assert [one.name for one in (theirs / "moved").iterdir()] == ["precious"]
+
+
+@only_root
+def test_a_file_gets_its_name_where_it_was_begun(theirs: Path, precious: Path, astray: Callable[[], None]) -> None:
+    growing = GrowingFile(theirs / "out" / "precious", append=False, at_once=True)
+    growing.write(b"mine")
+    as_nobody(astray)
+    growing.complete()
+    assert (theirs / "moved" / "precious").read_text() == "mine"
+    assert precious.read_text() == "precious"
+
+
+def test_no_handle_is_left_open(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "one")
+    before = os.listdir("/proc/self/fd")  # noqa: PTH208
+    write_whole(tmp_path / "link", lambda file: file.write(b"mine"))
+    appends(tmp_path / "link")
+    need_writable(tmp_path / "link")
+    open_new(tmp_path / "one", force=True).close()
+    for wrong in ("nowhere/one", "one/two", "", "../..", "circle/one"):
+        (tmp_path / "circle").unlink(missing_ok=True)
+        (tmp_path / "circle").symlink_to("circle")
+        with pytest.raises(OSError, match="No such|[Dd]irectory|levels of symbolic"):
+            write_whole(tmp_path / wrong, lambda file: file.write(b"mine"))
+    assert os.listdir("/proc/self/fd") == before  # noqa: PTH208
+
+
 def test_a_pipe_of_ours_waits_for_its_reader(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -193,16 +254,6 @@ def test_a_pipe_of_ours_waits_for_its_reader(tmp_path: Path) -> None:
     writer.join()
     reader.join()
     assert heard == [b"mine"]
-
-
-@pytest.fixture
-def theirs() -> Iterator[Path]:
-    """A folder in which another user may do everything, and in which we write."""
-    folder = Path(tempfile.mkdtemp(prefix="hfg-attack-", dir="/tmp"))
-    folder.chmod(0o777)
-    os.chown(folder, NOBODY, NOBODY)
-    yield folder
-    shutil.rmtree(folder)
 
 
 def permissions(file: Path) -> int:
@@ -280,6 +331,19 @@ def test_a_video_is_written_into_no_other_file_whatever_is_put_in_its_place(
     assert precious.read_text() == "precious"
     assert permissions(precious) == 0o600
     assert (theirs / "out.avi").read_bytes()[:4] == b"RIFF"
+
+
+@only_root
+def test_a_video_gets_its_name_where_it_was_begun(theirs: Path, precious: Path, astray: Callable[[], None]) -> None:
+    from hfg.nodes.video import WriteVideo
+
+    ours = precious.rename(precious.with_name("out.avi"))
+    node = WriteVideo(path=str(theirs / "out" / "out.avi"))
+    fire(node, image=np.zeros((48, 64, 3), np.uint8))
+    as_nobody(astray)
+    fire(node, slot="finish")
+    assert ours.read_text() == "precious"
+    assert (theirs / "moved" / "out.avi").read_bytes()[:4] == b"RIFF"
 
 
 @only_root

@@ -6,15 +6,13 @@ import errno
 import os
 import stat
 import sys
-import tempfile
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import cv2
 from annotated_types import Interval
 
-from hfg.base.whole import need_trusted
+from hfg.base.places import Place
 from hfg.images import Picture
 from hfg.nodes._encodable import need_encodable
 from hfg.nodes._pictures import colour, need_picture
@@ -120,7 +118,6 @@ class WriteVideo(Node):
         target = Path(self.path).absolute()
         self._folder()
         with reaching(self.path, "write"):
-            need_trusted(target)
             unfinished = _Unfinished(target)
         writer = cv2.VideoWriter(str(unfinished.path), cv2.VideoWriter.fourcc(*self.codec), self.fps, size)
         if not writer.isOpened():
@@ -157,7 +154,7 @@ class WriteVideo(Node):
         try:
             with reaching(self.target, "write"):
                 _need_complete(unfinished.path, self.count)
-                unfinished.path.replace(self.target)
+                unfinished.take_over()
         finally:
             unfinished.remove()
         return self.target
@@ -187,17 +184,30 @@ class _Unfinished:
     """
 
     def __init__(self, target: Path) -> None:
-        self._folder = Path(tempfile.mkdtemp(prefix=f".{target.stem}-", dir=target.parent))
+        self._place = Place(target)
+        self._folder = self._place.make_folder(f".{target.stem}-")
         self._handle = -1
-        inside = self._folder
+        inside = self._place.path.with_name(self._folder)
+        self._name = f"video{target.suffix}"
         if sys.platform == "linux":
-            self._handle = os.open(self._folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+            self._handle = self._place.open(os.O_RDONLY | os.O_DIRECTORY, self._folder)
             there = os.fstat(self._handle)
             if there.st_uid != os.geteuid() or stat.S_IMODE(there.st_mode) != stat.S_IRWXU:
                 os.close(self._handle)
                 raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
             inside = Path(f"/proc/self/fd/{self._handle}")
-        self.path = inside / f"video{target.suffix}"
+        self.path = inside / self._name
+
+    def take_over(self) -> None:
+        """Put it in the place of the other file.
+
+        Raises:
+          OSError: it cannot be renamed.
+        """
+        if self._handle >= 0:
+            self._place.take_over(self._name, folder=self._handle)
+        else:
+            self.path.replace(self._place.path)
 
     def remove(self) -> None:
         """Remove what is left of it."""
@@ -205,8 +215,8 @@ class _Unfinished:
         if self._handle >= 0:
             os.close(self._handle)
             self._handle = -1
-        with suppress(OSError):  # another user, who may write to the outer folder, has moved it
-            self._folder.rmdir()
+        with self._place:
+            self._place.remove_folder(self._folder)
 
 
 def _need_room(file: Path) -> None:
