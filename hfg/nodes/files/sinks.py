@@ -44,6 +44,7 @@ class _WholeFiles(Node):
     first = Parameter(1, Interval(ge=0))
     overwrite = Parameter(True)
     number = State[int | None](None)
+    written = Output(str)
 
     def _write(self, write: Callable[[BinaryIO], Any]) -> str:
         number = self.first if self.number is None else self.number
@@ -78,7 +79,6 @@ class WriteText(_WholeFiles):
 
     text = Input(str)
     encoding = Parameter("utf-8", choices=_ENCODINGS)
-    written = Output(str)
 
     def process(self, text: str) -> str:
         """Write it."""
@@ -108,7 +108,6 @@ class WriteBytes(_WholeFiles):
     """
 
     data = Input(bytes)
-    written = Output(str)
 
     def process(self, data: bytes) -> str:
         """Write it."""
@@ -141,7 +140,6 @@ class WriteJson(_WholeFiles):
 
     value = Input(object)
     indent = Parameter(2, Interval(ge=0, le=16))
-    written = Output(str)
 
     def process(self, value: object) -> str:
         """Write it."""
@@ -174,7 +172,6 @@ class WriteArray(_WholeFiles):
     """
 
     array = Input(Array)
-    written = Output(str)
 
     def process(self, array: Array) -> str:
         """Write it."""
@@ -210,7 +207,6 @@ class WriteArrays(_WholeFiles):
 
     arrays = Input(Mapping[str, Array])
     compressed = Parameter(True)
-    written = Output(str)
 
     def process(self, arrays: Mapping[str, Array]) -> str:
         """Write it."""
@@ -248,7 +244,6 @@ class WriteImage(_WholeFiles):
     path = Parameter("image-{number:04}.png", Predicate(is_a_path), Predicate(is_a_format), save=True, pattern=PICTURES)
     image = Input(AnyImage)
     quality = Parameter(95, Interval(ge=1, le=100))
-    written = Output(str)
 
     def process(self, image: AnyImage) -> str:
         """Write it."""

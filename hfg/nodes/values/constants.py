@@ -48,6 +48,12 @@ class _Constant(Node):
     """
 
     told = State(factory=list[Any])
+    value: Parameter[Any]
+    changed: Event[Any]
+
+    def process(self) -> Any:
+        """Return the value."""
+        return self._give(self.value, self.value, self.changed)
 
     def _give(self, found: Any, value: T, changed: EventPort[T]) -> T:
         """Return a value that is made of what the parameter was found to be, which can be compared."""
@@ -73,10 +79,6 @@ class ConstantBool(_Constant):
     out = Output(bool)
     changed = Event(bool)
 
-    def process(self) -> bool:
-        """Return the value."""
-        return self._give(self.value, self.value, self.changed)
-
 
 class ConstantInt(_Constant):
     """Send a whole number that is set by hand; an endless source.
@@ -95,10 +97,6 @@ class ConstantInt(_Constant):
     value = Parameter(0)
     out = Output(int)
     changed = Event(int)
-
-    def process(self) -> int:
-        """Return the value."""
-        return self._give(self.value, self.value, self.changed)
 
 
 class ConstantFloat(_Constant):
@@ -119,10 +117,6 @@ class ConstantFloat(_Constant):
     out = Output(float)
     changed = Event(float)
 
-    def process(self) -> float:
-        """Return the value."""
-        return self._give(self.value, self.value, self.changed)
-
 
 class ConstantText(_Constant):
     """Send a text that is set by hand; an endless source.
@@ -141,10 +135,6 @@ class ConstantText(_Constant):
     value = Parameter("")
     out = Output(str)
     changed = Event(str)
-
-    def process(self) -> str:
-        """Return the value."""
-        return self._give(self.value, self.value, self.changed)
 
 
 class ConstantVector(_Constant):
@@ -211,15 +201,26 @@ class ConstantColour(_Constant):
     out = Output(Colour)
     changed = Event(Colour)
 
-    def process(self) -> Colour:
-        """Return the value."""
-        return self._give(self.value, self.value, self.changed)
-
 
 # --- given out at a signal ---
 
 
-class BoolOnTrigger(Node):
+class _OnTrigger(Node):
+    """Sends its value at each signal."""
+
+    value: Parameter[Any]
+    given: Event[Any]
+
+    @slot
+    def trigger(self) -> None:
+        """Send the value."""
+        self.given.trigger(self._given())
+
+    def _given(self) -> Any:
+        return self.value
+
+
+class BoolOnTrigger(_OnTrigger):
     """Send a truth value at each signal.
 
     Attributes:
@@ -231,13 +232,8 @@ class BoolOnTrigger(Node):
     value = Parameter(False)
     given = Event(bool)
 
-    @slot
-    def trigger(self) -> None:
-        """Send the value."""
-        self.given.trigger(self.value)
 
-
-class IntOnTrigger(Node):
+class IntOnTrigger(_OnTrigger):
     """Send a whole number at each signal.
 
     Attributes:
@@ -249,13 +245,8 @@ class IntOnTrigger(Node):
     value = Parameter(0)
     given = Event(int)
 
-    @slot
-    def trigger(self) -> None:
-        """Send the value."""
-        self.given.trigger(self.value)
 
-
-class FloatOnTrigger(Node):
+class FloatOnTrigger(_OnTrigger):
     """Send a number at each signal.
 
     Attributes:
@@ -267,13 +258,8 @@ class FloatOnTrigger(Node):
     value = Parameter(0.0, unit="of the value")
     given = Event(float)
 
-    @slot
-    def trigger(self) -> None:
-        """Send the value."""
-        self.given.trigger(self.value)
 
-
-class TextOnTrigger(Node):
+class TextOnTrigger(_OnTrigger):
     """Send a text at each signal.
 
     Attributes:
@@ -285,13 +271,8 @@ class TextOnTrigger(Node):
     value = Parameter("")
     given = Event(str)
 
-    @slot
-    def trigger(self) -> None:
-        """Send the value."""
-        self.given.trigger(self.value)
 
-
-class VectorOnTrigger(Node):
+class VectorOnTrigger(_OnTrigger):
     """Send a vector at each signal, as an array.
 
     Attributes:
@@ -305,13 +286,11 @@ class VectorOnTrigger(Node):
     )
     given = Event(VectorArray)
 
-    @slot
-    def trigger(self) -> None:
-        """Send the value."""
-        self.given.trigger(as_array(self.value, 1))
+    def _given(self) -> Any:
+        return as_array(self.value, 1)
 
 
-class MatrixOnTrigger(Node):
+class MatrixOnTrigger(_OnTrigger):
     """Send a matrix at each signal, as an array.
 
     Attributes:
@@ -323,13 +302,11 @@ class MatrixOnTrigger(Node):
     value = Parameter[Rows](((1.0, 0.0), (0.0, 1.0)), Predicate(has_floats), type=Rows, unit="of the value")
     given = Event(MatrixArray)
 
-    @slot
-    def trigger(self) -> None:
-        """Send the value."""
-        self.given.trigger(as_array(self.value, 2))
+    def _given(self) -> Any:
+        return as_array(self.value, 2)
 
 
-class ColourOnTrigger(Node):
+class ColourOnTrigger(_OnTrigger):
     """Send a colour at each signal.
 
     Attributes:
@@ -340,11 +317,6 @@ class ColourOnTrigger(Node):
 
     value = Parameter(Colour(255, 255, 255))
     given = Event(Colour)
-
-    @slot
-    def trigger(self) -> None:
-        """Send the value."""
-        self.given.trigger(self.value)
 
 
 @node

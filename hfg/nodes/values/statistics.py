@@ -140,6 +140,11 @@ class _Window(Node):
             self.kept.popleft()
         return self.kept
 
+    @slot
+    def clear(self) -> None:
+        """Forget all."""
+        self.kept = deque()
+
 
 class WindowStatistics(_Window):
     """Send mean, median, spread, smallest and largest of the last numbers.
@@ -176,11 +181,6 @@ class WindowStatistics(_Window):
         std = math.sqrt(squares / (len(kept) - 1)) if len(kept) > 1 else 0.0
         return mean, statistics.median(kept), std, min(kept), max(kept)
 
-    @slot
-    def clear(self) -> None:
-        """Forget all."""
-        self.kept = deque()
-
 
 class MovingAverage(_Window):
     """Send the mean of the last numbers; before there are so many, of those that there are.
@@ -203,11 +203,6 @@ class MovingAverage(_Window):
         """Take one more."""
         kept = self._keep(value, self.size)
         return sum(kept) / len(kept)
-
-    @slot
-    def clear(self) -> None:
-        """Forget all."""
-        self.kept = deque()
 
 
 class MovingMedian(_Window):
@@ -232,11 +227,6 @@ class MovingMedian(_Window):
     def process(self, value: float) -> float:
         """Take one more."""
         return statistics.median(self._keep(value, self.size))
-
-    @slot
-    def clear(self) -> None:
-        """Forget all."""
-        self.kept = deque()
 
 
 class Histogram(Node):
@@ -334,6 +324,11 @@ class _Timed(Node):
         self.stamp = now
         return None if last is None else now - last
 
+    @slot
+    def clear(self) -> None:
+        """Forget the previous value."""
+        self.stamp = None
+
 
 class LowPass(_Timed):
     """Smooth a stream of numbers as a low-pass filter of first order does, whatever the rate of the tokens.
@@ -365,11 +360,6 @@ class LowPass(_Timed):
             self.before += (value.value - self.before) * -math.expm1(-passed / self.time_constant_s)
         return self.before
 
-    @slot
-    def clear(self) -> None:
-        """Forget the previous value."""
-        self.stamp = None
-
 
 class Derivative(_Timed):
     """Send by how much a number changes in a second.
@@ -399,11 +389,6 @@ class Derivative(_Timed):
         slope = (number - self.before) / passed
         self.before = number
         return slope
-
-    @slot
-    def clear(self) -> None:
-        """Forget the previous value."""
-        self.stamp = None
 
 
 class Difference(Node):
