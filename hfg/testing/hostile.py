@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import collections
 import ctypes
-import dataclasses
 import enum
 import mmap
 import os
@@ -22,11 +21,11 @@ from pathlib import Path, PurePath
 from typing import Any, Final, Literal
 
 import annotated_types
-import msgspec
 import numpy as np
 
 from hfg.base.generics import callable_parts
 from hfg.base.values import Colour, Span
+from hfg.encoding.records import names_of
 from hfg.ports.specs import ParameterSpec
 from hfg.testing.opening import opened
 from hfg.testing.samples import PATHS
@@ -234,12 +233,8 @@ class Hostile:
     def _record(self, kind: type, depth: int) -> Any:
         if kind.__module__.partition(".")[0] == "cv2":
             return self._of_opencv(kind)
-        hints = typing.get_type_hints(kind, include_extras=True)
-        if dataclasses.is_dataclass(kind):
-            names = [field.name for field in dataclasses.fields(kind) if field.init]
-        elif issubclass(kind, msgspec.Struct):
-            names = list(kind.__struct_fields__)
-        else:
+        names, hints = names_of(kind, given=True), typing.get_type_hints(kind, include_extras=True)
+        if names is None:
             return self._anything(depth)
         try:
             return kind(**{name: self._of(hints[name], (), depth + 1) for name in names})

@@ -21,13 +21,13 @@ from pathlib import Path, PurePath
 from typing import Any, Final, Literal
 
 import annotated_types
-import msgspec
 import numpy as np
 from hypothesis import strategies as st
 
 from hfg.base.generics import callable_parts
 from hfg.base.limits import limits_of
 from hfg.base.values import Colour, Span
+from hfg.encoding.records import names_of
 from hfg.ports.specs import ParameterSpec
 from hfg.testing.opening import opened
 from hfg.testing.samples import PATHS
@@ -198,7 +198,7 @@ def _of(hint: Any, limits: tuple[Any, ...], alike: Alike | None) -> st.SearchStr
     container = _container(origin, arguments, limits, alike)
     if container is not None:
         return container
-    if _is_record(origin):
+    if typing.is_typeddict(origin) or names_of(origin) is not None:
         return _record(origin, alike)
     return st.from_type(hint)
 
@@ -377,15 +377,6 @@ def _hashable(hint: Any, limits: tuple[Any, ...], alike: Alike | None) -> st.Sea
     return _anything(hashable=True) if bare_type(hint) in (Any, object) else _values(hint, limits, alike)
 
 
-def _is_record(kind: Any) -> bool:
-    return (
-        dataclasses.is_dataclass(kind)
-        or typing.is_typeddict(kind)
-        or (issubclass(kind, tuple) and hasattr(kind, "_fields"))
-        or issubclass(kind, msgspec.Struct)
-    )
-
-
 @functools.lru_cache(maxsize=256)
 def _record(kind: Any, alike: Alike | None) -> st.SearchStrategy[Any]:
     """Return one strategy for each kind, so that those that hold themselves come to an end."""
@@ -394,12 +385,7 @@ def _record(kind: Any, alike: Alike | None) -> st.SearchStrategy[Any]:
 
 def _records(kind: Any, alike: Alike | None) -> st.SearchStrategy[Any]:
     hints = typing.get_type_hints(kind, include_extras=True)
-    if dataclasses.is_dataclass(kind):
-        names = [field.name for field in dataclasses.fields(kind) if field.init]
-    elif typing.is_typeddict(kind):
-        names = list(hints)
-    else:
-        names = list(getattr(kind, "_fields", ()) or kind.__struct_fields__)
+    names = names_of(kind, given=True) or list(hints)
     return st.fixed_dictionaries({name: _values(hints.get(name, Any), (), alike) for name in names}).map(
         lambda fields: kind(**fields)
     )

@@ -1,16 +1,15 @@
 """What is inside of a value: keys of dicts, fields of records, items of lists; methods and private names are not.
 
-Depends on dataclasses and msgspec.
+Depends on `encoding.records`.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import msgspec
+from hfg.encoding.records import names_of
 
 
 def read_field(value: Any, path: str) -> Any:
@@ -46,10 +45,5 @@ def record_fields(value: Any) -> list[str]:
     """Name the fields of a record; other objects have none, because reading their attributes may do anything."""
     if isinstance(value, type):
         return []
-    if dataclasses.is_dataclass(value):
-        return [field.name for field in dataclasses.fields(value)]
-    if isinstance(value, msgspec.Struct):
-        return list(value.__struct_fields__)
-    if isinstance(value, tuple) and hasattr(value, "_fields"):
-        return list(value._fields)
-    return [field.name for field in getattr(type(value), "__attrs_attrs__", ())]
+    names = names_of(type(value))
+    return list(names) if names is not None else [field.name for field in getattr(type(value), "__attrs_attrs__", ())]
