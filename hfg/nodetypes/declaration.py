@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import inspect
 import re
-import types
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Final, TypeAlias, TypeVar
 
 from hfg.errors import DeclarationError, UsageError
-from hfg.nodetypes.description import EventSpec, InputSpec, NodeType, OutputSpec, Result, SlotSpec
+from hfg.nodetypes.description import EventSpec, InputSpec, NodeType, OutputSpec, SlotSpec
 from hfg.nodetypes.hints import MISSING, hints_of, kind_of, split_token
 from hfg.nodetypes.signature import Signature, read_signature
 from hfg.nodetypes.vectors import list_of, size_parameters, vector_specs
@@ -71,68 +70,80 @@ def snake_case(name: str) -> str:
 def declare(cls: type[Any], base: type[Any]) -> NodeType:
     """Describe a subclass of `base`, which is `Node`. Ports that `process` declares are added to the class."""
     where = f"node type {cls.__qualname__}"
-    is_subgraph = issubclass(cls, Relaying)
     _wrap_overridden_slots(cls, base)
+    kind = _described(cls, base, where)
+    check_names(kind, where, _SUBGRAPH_RESERVED if kind.is_subgraph else RESERVED)
+    install_ports(cls, kind, base)
+    return kind
+
+
+def _described(cls: type[Any], base: type[Any], where: str) -> NodeType:
+    is_subgraph = issubclass(cls, Relaying)
     declared = _declared(cls, base, where)
     vectors = vector_specs(declared, where)
     parameters = {name: parameter.spec(where) for name, parameter in _of(declared, Parameter).items()}
     parameters.update(size_parameters(vectors))
     inputs = {name: _input_spec(name, d) for name, d in _declared_as(declared, Input, Inputs)}
     outputs = {name: OutputSpec(name, d.type) for name, d in _declared_as(declared, Output, Outputs)}
-    process = cls.process
     signature = None
-    if process is not base.process:
-        if is_subgraph:
-            raise DeclarationError(
-                f"{where}: a subgraph does not fire itself; move the work into a node and add it in build()"
-            )
-        if isinstance(process, _DECLARATIONS) or not callable(process):
-            raise DeclarationError(
-                f'{where}: "process" is reserved for the function of a firing, got {process!r}; choose another name'
-            )
-        signature = _read_process(cls, process, inputs, vectors, where)
+    if _has_process(cls, base, where, is_subgraph):
+        signature = _read_process(cls, cls.process, inputs, vectors, where)
         inputs = {spec.name: spec for spec in signature.inputs}
         parameters.update((spec.name, spec) for spec in signature.parameters if spec.name not in parameters)
         outputs = outputs or _outputs(signature, where, must_say=not _has_inputs(declared))
+    triggers = [spec for spec in parameters.values() if spec.trigger]
     events = {name: EventSpec(name, d.type) for name, d in _declared_as(declared, Event, Events)}
+    events.update((spec.name, EventSpec(spec.name, spec.type)) for spec in triggers)
     slots = {name: _slot_spec(cls, d, where, is_subgraph) for name, d in _declared_as(declared, Slot, Slots)}
-    for spec in parameters.values():
-        if spec.trigger:
-            events[spec.name], slots[spec.name] = (
-                EventSpec(spec.name, spec.type),
-                SlotSpec(spec.name, spec.type or object),
-            )
-    for hook in HOOKS:
-        found = inspect.getattr_static(cls, hook)
-        if getattr(cls, hook) is not getattr(base, hook) and inspect.isfunction(found):
-            _behind_self(found, hook, where)
-    completes = _do_activity(cls, base, where, is_subgraph)
-    result: Result = "none" if not outputs else "single" if len(outputs) == 1 else "fields"
-    kind = NodeType(
+    slots.update((spec.name, SlotSpec(spec.name, spec.type or object)) for spec in triggers)
+    return NodeType(
         name=snake_case(cls.__name__),
         origin=cls,
         module=cls.__module__,
         qualname=cls.__qualname__,
         doc=inspect.cleandoc(cls.__dict__.get("__doc__") or ""),
-        inputs=types.MappingProxyType(inputs),
-        outputs=types.MappingProxyType(outputs),
-        events=types.MappingProxyType(events),
-        slots=types.MappingProxyType(slots),
-        parameters=types.MappingProxyType(parameters),
-        states=types.MappingProxyType(_of(declared, State)),
+        inputs=inputs,
+        outputs=outputs,
+        events=events,
+        slots=slots,
+        parameters=parameters,
+        states=_of(declared, State),
         process_kind="none" if signature is None else signature.kind,
-        result=result,
+        result="none" if not outputs else "single" if len(outputs) == 1 else "fields",
         is_subgraph=is_subgraph,
         shared=shared_names(inputs, outputs, events, slots),
         declared=declared,
-        hooks=frozenset(name for name in HOOKS if getattr(cls, name) is not getattr(base, name)),
-        completes=completes,
+        hooks=_hooks(cls, base, where),
+        completes=_do_activity(cls, base, where, is_subgraph),
         caller=None if signature is None else _caller(signature),
-        vectors=types.MappingProxyType(vectors),
+        vectors=vectors,
     )
-    check_names(kind, where, _SUBGRAPH_RESERVED if is_subgraph else RESERVED)
-    install_ports(cls, kind, base)
-    return kind
+
+
+def _has_process(cls: type[Any], base: type[Any], where: str, is_subgraph: bool) -> bool:
+    """Return whether it has a process function of its own, and refuse what cannot be one."""
+    process = cls.process
+    if process is base.process:
+        return False
+    if is_subgraph:
+        raise DeclarationError(
+            f"{where}: a subgraph does not fire itself; move the work into a node and add it in build()"
+        )
+    if isinstance(process, _DECLARATIONS) or not callable(process):
+        raise DeclarationError(
+            f'{where}: "process" is reserved for the function of a firing, got {process!r}; choose another name'
+        )
+    return True
+
+
+def _hooks(cls: type[Any], base: type[Any], where: str) -> frozenset[str]:
+    """Return the hooks that it overrides."""
+    names = frozenset(name for name in HOOKS if getattr(cls, name) is not getattr(base, name))
+    for name in HOOKS:
+        found = inspect.getattr_static(cls, name)
+        if name in names and inspect.isfunction(found):
+            _behind_self(found, name, where)
+    return names
 
 
 def _do_activity(cls: Any, base: type, where: str, is_subgraph: bool) -> Any:

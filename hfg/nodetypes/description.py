@@ -10,7 +10,7 @@ import functools
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any, Literal
 
 import msgspec
@@ -114,6 +114,10 @@ class NodeType:
     caller: Callable[[Any], Callable[..., Any]] | None = None
     vectors: Mapping[str, VectorSpec] = field(default_factory=dict)
     layout: tuple[int | None, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("inputs", "outputs", "events", "slots", "parameters", "states", "vectors"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     @property
     def is_source(self) -> bool:

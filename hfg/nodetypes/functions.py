@@ -14,13 +14,13 @@ import types
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Concatenate, Generic, ParamSpec, TypeVar, cast, overload
 
-import msgspec
 import numpy as np
 from typing_extensions import TypeForm
 
+from hfg.encoding.records import names_of
 from hfg.errors import DeclarationError
 from hfg.nodetypes.declaration import RESERVED, check_names, install_ports, shared_names, snake_case
-from hfg.nodetypes.description import InputSpec, NodeType, OutputSpec, Result
+from hfg.nodetypes.description import InputSpec, NodeType, OutputSpec
 from hfg.nodetypes.hints import MISSING, function_name, hints_of_class, output_type
 from hfg.nodetypes.node import Node
 from hfg.nodetypes.signature import CallPlan, Signature, read_signature
@@ -207,45 +207,18 @@ def make_type(
     name = function_name(function)
     where = f"node type {name}"
     declared = _declared_vectors(where, inputs, outputs)
-    vectors = vector_specs(declared, where)
     signature = _read(function, where, inputs, outputs, parameters)
-    output_specs, fields = _read_outputs(function, where, outputs, signature)
-    result: Result = "none" if not output_specs else "fields" if fields is not None else "single"
-    plan = signature.plan
     if inspect.isclass(function) and not signature.inputs:
         raise DeclarationError(
             f"{where}: a class without inputs would be an endless source of {name} objects; write `class "
             f"{name}(hfg.Node)` for a node type with state, or decorate a function"
         )
-    inputs_by_name = {spec.name: spec for spec in signature.inputs}
-    parameters_by_name = {spec.name: spec for spec in signature.parameters} | size_parameters(vectors)
-    if len(inputs_by_name) < len(signature.inputs):
-        raise DeclarationError(f"{where}: two inputs have the same name; give each its own in inputs=")
-
-    def call_of(made: Node) -> Callable[..., Any]:
-        return plan.bind(function, made._parameters)
+    described = _described(function, name, module, signature, _read_outputs(function, where, outputs, signature))
 
     def describe_type(cls: type[Node]) -> NodeType:
-        made = NodeType(
-            name=snake_case(name) or "function",
-            origin=cls,  # replaced by the NodeFunction below
-            module=module,
-            qualname=getattr(function, "__qualname__", name)
-            if getattr(function, "__module__", None) == module
-            else name,
-            doc=inspect.cleandoc(getattr(function, "__doc__", None) or ""),
-            inputs=types.MappingProxyType(inputs_by_name),
-            outputs=types.MappingProxyType({spec.name: spec for spec in output_specs}),
-            parameters=types.MappingProxyType(parameters_by_name),
-            process_kind=signature.kind,
-            result=result,
-            fields=fields or (),
-            is_function=True,
-            shared=shared_names(inputs_by_name, [spec.name for spec in output_specs], (), ()),
-            caller=call_of,
-            declared=declared,
-            vectors=types.MappingProxyType(vectors),
-        )
+        vectors = vector_specs(declared, where)
+        parameters = {**described.parameters, **size_parameters(vectors)}
+        made = dataclasses.replace(described, origin=cls, declared=declared, vectors=vectors, parameters=parameters)
         check_names(made, where, RESERVED)
         install_ports(cls, made, Node)
         for vector_name, vector in declared.items():
@@ -263,10 +236,41 @@ def make_type(
     )
     made: NodeFunction[..., Any] = NodeFunction(function, node_class)
     node_class._type = dataclasses.replace(node_class._type, origin=made)
-    if vectors:
+    if node_class._type.vectors:
         node_class._stand_for_sizes()
     made._type = node_class._type
     return made
+
+
+def _described(
+    function: Callable[..., Any],
+    name: str,
+    module: str,
+    signature: Signature,
+    results: tuple[list[OutputSpec], tuple[str, ...] | None],
+) -> NodeType:
+    """Describe a function without its vectors of ports; its class takes the function's place at first."""
+    inputs = {spec.name: spec for spec in signature.inputs}
+    if len(inputs) < len(signature.inputs):
+        raise DeclarationError(f"node type {name}: two inputs have the same name; give each its own in inputs=")
+    outputs, fields = {spec.name: spec for spec in results[0]}, results[1]
+    is_of_module = getattr(function, "__module__", None) == module
+    return NodeType(
+        name=snake_case(name) or "function",
+        origin=function,
+        module=module,
+        qualname=getattr(function, "__qualname__", name) if is_of_module else name,
+        doc=inspect.cleandoc(getattr(function, "__doc__", None) or ""),
+        inputs=inputs,
+        outputs=outputs,
+        parameters={spec.name: spec for spec in signature.parameters},
+        process_kind=signature.kind,
+        result="none" if not outputs else "fields" if fields is not None else "single",
+        fields=fields or (),
+        is_function=True,
+        shared=shared_names(inputs, outputs, (), ()),
+        caller=lambda made: signature.plan.bind(function, made._parameters),
+    )
 
 
 def _declared_vectors(where: str, inputs: Mapping[str, Any] | None, outputs: Any) -> dict[str, Vector[Any]]:
@@ -344,16 +348,8 @@ def _read_outputs(
 
 def _fields_of(outputs: Any, where: str) -> dict[str, Any] | None:
     """Return the fields of a NamedTuple, dataclass or msgspec struct; None for any other type."""
-    if not inspect.isclass(outputs):
-        return None
-    named_tuple = issubclass(outputs, tuple) and hasattr(outputs, "_fields")
-    if not (named_tuple or dataclasses.is_dataclass(outputs) or issubclass(outputs, msgspec.Struct)):
+    names = names_of(outputs)
+    if names is None:
         return None
     hints = hints_of_class(outputs, where)
-    if named_tuple:
-        names: tuple[str, ...] = cast(Any, outputs)._fields
-    elif dataclasses.is_dataclass(outputs):
-        names = tuple(item.name for item in dataclasses.fields(outputs))
-    else:
-        names = cast(Any, outputs).__struct_fields__
     return {name: hints.get(name, Any) for name in names}

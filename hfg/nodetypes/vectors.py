@@ -148,7 +148,7 @@ class Vectors:
             events=_spread(pattern.events, counts, lambda spec, name: EventSpec(name, spec.type)),
             slots=slots,
             declared={**pattern.declared, **handlers},
-            vectors=types.MappingProxyType(vectors),
+            vectors=vectors,
             result="fields" if has_outputs else pattern.result,
             layout=layout if has_outputs else (),
             caller=None if pattern.caller is None else _gathering(pattern.caller, pattern.inputs, counts),
@@ -179,7 +179,7 @@ def _spread(specs: Mapping[str, Any], counts: Mapping[str, int], made: Callable[
             found.update((one, made(spec, one)) for one in names)
         else:
             found[name] = spec
-    return types.MappingProxyType(found)
+    return found
 
 
 def _input(vector: VectorSpec, pattern: InputSpec, name: str) -> InputSpec:
