@@ -56,32 +56,37 @@ def studio(
 ) -> int:
     """Build, watch and steer a graph in the browser."""
     show.set_debug(flags.debug)
+    _need_extra()
+    tls = {"certfile": certfile and str(certfile), "keyfile": keyfile and str(keyfile)}
+    options = {"host": host, "port": port, "insecure": insecure, **tls}
+    if attach is not None:
+        return _attach(attach, target, options, browser, read_only=read_only)
+    if target is not None and target.endswith(".mcap"):
+        made = _of_recording(target, into, flags, read_only=_why(read_only))
+    elif into is not None:
+        raise TargetError(f'--into names the graph of a recording, so "{into}" means nothing here; leave it out')
+    else:
+        made = _of_graph(target, param, flags, inside=inside, read_only=_why(read_only))
+    return _serve(made, options, browser, at_once=run)
+
+
+def _need_extra() -> None:
     try:
         import hfg.studio.serving  # noqa: F401 - of the extra
     except ImportError as error:
         raise TargetError(f'the studio needs {error.name}: pip install "hfg[studio]"') from None
-    options: dict[str, Any] = {
-        "host": host,
-        "port": port,
-        "certfile": None if certfile is None else str(certfile),
-        "keyfile": None if keyfile is None else str(keyfile),
-        "insecure": insecure,
-    }
-    if attach is not None:
-        return _attach(attach, target, options, browser, read_only=read_only)
-    if target is not None and target.endswith(".mcap"):
-        return _look_at(target, into, flags, options, browser, at_once=run, read_only=_why(read_only))
-    if into is not None:
-        raise TargetError(f'--into names the graph of a recording, so "{into}" means nothing here; leave it out')
+
+
+def _of_graph(target: str | None, param: list[str] | None, flags: LoadFlags, *, inside: str, read_only: str) -> Studio:
+    """Make the studio of a graph; without a target, of an empty one."""
     graph = Graph("graph") if target is None else load_graph(target, flags.arg, flags.allow)
     set_parameters(graph, param or [])
+    _need_subgraph(graph, inside)
     file = _file_of(target)
     folder = Path.cwd() if file is None else file.resolve().parent
     allow = flags.allow or ()
     project = Project(graph, folder, file, allow=allow, read=lambda path: load_graph(str(path), [], allow))
-    _need_subgraph(graph, inside)
-    made = Studio(project, read_only=_why(read_only), target=target or graph.name, level=inside)
-    return _serve(made, options, browser, at_once=run)
+    return Studio(project, read_only=read_only, target=target or graph.name, level=inside)
 
 
 def _why(read_only: bool) -> str:
@@ -93,17 +98,8 @@ def _need_subgraph(graph: Graph, path: str) -> None:
         raise TargetError(f'"{path}" is not a subgraph, so nothing is inside it; name another one by --inside')
 
 
-def _look_at(
-    file: str,
-    into: str | None,
-    flags: LoadFlags,
-    options: Mapping[str, Any],
-    browser: bool,
-    *,
-    at_once: bool,
-    read_only: str,
-) -> int:
-    """Serve pages of a recording."""
+def _of_recording(file: str, into: str | None, flags: LoadFlags, *, read_only: str) -> Studio:
+    """Make the studio of a recording."""
     from hfg.studio.recorded import Recorded
 
     graph = None if into is None else load_graph(into, flags.arg, flags.allow)
@@ -112,7 +108,7 @@ def _look_at(
     except UsageError as error:
         raise TargetError(str(error)) from None
     project = RecordedProject(recorded.graph_after(0), Path(file), allow=flags.allow or ())
-    return _serve(Studio(project, recorded=recorded, read_only=read_only), options, browser, at_once=at_once)
+    return Studio(project, recorded=recorded, read_only=read_only)
 
 
 def _serve(made: Studio, options: Mapping[str, Any], browser: bool, *, at_once: bool) -> int:

@@ -1,6 +1,6 @@
 """The first graph of a new user: a camera sees a ball that rolls over a table, and a mission follows it.
 
-Everything is simulated, so it runs on any computer. Depends on the graph and `hfg.panels`.
+Everything is simulated, so it runs on any computer. Depends on the graph, `hfg.panels` and the library's nodes.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from annotated_types import Interval
 from hfg.base import clock
 from hfg.graph import Graph, Subgraph
 from hfg.images import Gray
+from hfg.nodes import activity
 from hfg.nodetypes.node import Node
 from hfg.panels import Call, Change, Look, Scene, view
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 
-__all__ = ["Aim", "Camera", "Find", "Follow", "Keep", "Push", "Rest", "Search", "Spot", "build"]
+__all__ = ["Aim", "Camera", "Find", "Follow", "Keep", "Push", "Search", "Spot", "build"]
 
 _WIDTH: Final = 320
 _HEIGHT: Final = 200
@@ -262,31 +263,13 @@ class Follow(Subgraph):
         keep.timeout.activates(self.tired.inner)
 
 
-class Rest(Node):
-    """Rest for a moment.
-
-    Attributes:
-      duration: for how long.
-      done: it is over.
-    """
-
-    duration = Parameter(1.5, Interval(gt=0, le=10), unit="s")
-    done = Event()
-
-    @slot
-    async def begin(self) -> None:
-        """Rest, then hand the activity on."""
-        await asyncio.sleep(self.duration)
-        self.done.trigger()
-
-
 def build() -> Graph:
     """Put the camera next to the mission."""
     graph = Graph("ball")
     camera = graph.add(Camera(), name="camera", max_rate_hz=_RATE_HZ)
     find = graph.add(Find(), name="find")
     graph.connect(camera.picture, find.picture)
-    search, rest = graph.add(Search(), name="search"), graph.add(Rest(), name="rest")
+    search, rest = graph.add(Search(), name="search"), graph.add(activity.Wait(seconds=1.5), name="rest")
     follow = graph.add(Follow(), name="follow")
     for node in (search, follow):
         graph.connect(find.seen, node.see)

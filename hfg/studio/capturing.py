@@ -1,4 +1,7 @@
-"""What a page shows, as a file: a level as SVG, a value as CSV or NPY. Depends on the drawing and the graph."""
+"""What a page shows, as a file: a level as SVG, a value as CSV or NPY.
+
+Depends on the drawing, the graph and `showing`.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,6 @@ import io
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, Literal, cast
 
-import msgspec
 import numpy as np
 
 from hfg.graph import Graph, drawing
@@ -18,6 +20,7 @@ from hfg.graph.structure.level import inside, level_of
 from hfg.graph.structure.paths import node_at
 from hfg.studio.layouts import positions
 from hfg.studio.refusing import Refused
+from hfg.studio.showing import fields_of
 
 __all__ = ["level_as_svg", "value_as_file"]
 
@@ -79,19 +82,8 @@ def _rows(value: object) -> Iterable[list[Any]]:
             raise Refused("usage", f"CSV has two dimensions, and this array has {value.ndim} ({shape}); save it as NPY")
         return [list(row) if np.ndim(row) else [row] for row in np.atleast_1d(value)]
     items = list(value) if isinstance(value, list | tuple) and not hasattr(value, "_fields") else [value]
-    records = [_record(one) for one in items]
-    if all(one is not None for one in records) and records:
-        names = list(dict.fromkeys(name for one in records if one is not None for name in one))
-        return [names, *([one.get(name, "") for name in names] for one in records if one is not None)]
+    records = [one for item in items if (one := item if isinstance(item, Mapping) else fields_of(item)) is not None]
+    if records and len(records) == len(items):
+        names = list(dict.fromkeys(name for one in records for name in one))
+        return [names, *([one.get(name, "") for name in names] for one in records)]
     return [list(one) if isinstance(one, list | tuple) else [one] for one in items]
-
-
-def _record(value: object) -> Mapping[str, Any] | None:
-    if isinstance(value, Mapping):
-        return {str(name): one for name, one in value.items()}
-    if isinstance(value, msgspec.Struct):
-        return msgspec.structs.asdict(value)
-    if hasattr(value, "_fields"):
-        return dict(zip(value._fields, value, strict=True))  # type: ignore[call-overload]
-    fields = getattr(value, "__dataclass_fields__", None)
-    return None if fields is None else {name: getattr(value, name) for name in fields}

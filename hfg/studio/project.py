@@ -283,6 +283,10 @@ class Project:
 
     # --- recordings ---
 
+    def graph_project(self) -> Project:
+        """Return the project that can open graphs of this folder: this one, unless it is that of a recording."""
+        return self
+
     def recording(self, graph: Graph, file: Path) -> RecordedProject:
         """Return the project of a recording in the same folder."""
         return RecordedProject(graph, file, self.folder, allow=self.allow, read=self._read)
@@ -310,8 +314,8 @@ class RecordedProject(Project):
             super().record(), name=self._recording.name, path=path, kind="recording", changes=0
         )
 
+    @override
     def graph_project(self) -> Project:
-        """Return the project of an empty graph in the same folder, which can open others."""
         return Project(Graph("graph"), self.folder, allow=self.allow, read=self._read)
 
 

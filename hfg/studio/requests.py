@@ -15,7 +15,6 @@ from hfg.studio import messages as m
 from hfg.studio.asking import ask
 from hfg.studio.following import Following
 from hfg.studio.offering import change_of, offered_action, signal_of
-from hfg.studio.project import RecordedProject
 from hfg.studio.recorded import Recorded
 from hfg.studio.refusing import Refused
 from hfg.studio.starters import starter_graph
@@ -174,16 +173,15 @@ async def _open(host: Any, viewer: Viewer, message: m.Open) -> None:
         if message.path.endswith(".mcap"):
             await _open_recording(host, message)
             return
-        was_recording = isinstance(host.project, RecordedProject)
-        project = host.project.graph_project() if isinstance(host.project, RecordedProject) else host.project
+        project = host.project.graph_project()
         if message.starter:
             project.begin(starter_graph(message.starter), discard=message.discard)
         else:
             project.open(message.path, discard=message.discard)
-        if was_recording:
-            await host.exchange(project, None)
-        else:
+        if project is host.project:
             host.take_graph(viewer.number, f"open {message.path or host.graph.name}")
+        else:
+            await host.exchange(project, None)
 
 
 async def _open_recording(host: Any, message: m.Open) -> None:

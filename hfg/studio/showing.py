@@ -17,7 +17,7 @@ from hfg.base.token import Token
 from hfg.engine.observing.encoding import encode, text
 from hfg.reporting.pictures import is_picture, png, smaller
 
-__all__ = ["image_frame", "kind_of", "number_in", "shown_value", "summary_of"]
+__all__ = ["fields_of", "image_frame", "kind_of", "number_in", "shown_value", "summary_of"]
 
 _MOST_BYTES: Final = 16_384
 _MOST_ELEMENTS: Final = 400
@@ -78,13 +78,7 @@ def kind_of(token: Token[Any]) -> str:
         return "image" if is_picture(value) else "array"
     if isinstance(value, list | tuple) and not hasattr(value, "_fields"):
         return "table" if value and all(isinstance(one, Mapping | tuple | msgspec.Struct) for one in value) else "list"
-    if (
-        isinstance(value, Mapping | msgspec.Struct)
-        or hasattr(value, "_fields")
-        or hasattr(value, "__dataclass_fields__")
-    ):
-        return "record"
-    return "other"
+    return "record" if isinstance(value, Mapping) or fields_of(value) is not None else "other"
 
 
 def summary_of(token: Token[Any]) -> str:
@@ -112,21 +106,21 @@ def _short(value: Any, depth: int) -> str:
         return f"{value:.4g}"
     if isinstance(value, str) and depth == 0:
         return " ".join(value.split())
-    fields = _fields(value)
+    fields = fields_of(value)
     if fields and depth < _DEEPEST:
         parts = [f"{name} {_short(one, depth + 1)}" for name, one in list(fields.items())[:_MOST_FIELDS]]
         return ", ".join(parts) + (", …" if len(fields) > _MOST_FIELDS else "")
-    if isinstance(value, list | tuple) and value and _fields(value[0]):
+    if isinstance(value, list | tuple) and value and fields_of(value[0]):
         return f"{len(value)} x {type(value[0]).__name__}"
     return text(value)
 
 
-def _fields(value: Any) -> dict[str, Any]:
-    """Return the fields of a record by name; of anything else none."""
+def fields_of(value: Any) -> dict[str, Any] | None:
+    """Return the fields of a record by name; None of anything else."""
     for names in ("_fields", "__struct_fields__", "__dataclass_fields__"):
-        if found := getattr(value, names, None):
+        if (found := getattr(value, names, None)) is not None:
             return {str(name): getattr(value, name) for name in found}
-    return {}
+    return None
 
 
 def number_in(value: object) -> float | None:
