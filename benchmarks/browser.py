@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tools.browser import WINDOW, Person
+from tools.browser import LISTENING, WINDOW, Person
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, CDPSession
@@ -34,19 +34,13 @@ window.moment = (type, holds) => window.measured = new Promise(done =>
     requestAnimationFrame(look);
   }, {capture: true, once: true}));
 window.heard = {run: null, moves: []};
-window.WebSocket = class extends WebSocket {
-  constructor(...args) {
-    super(...args);
-    this.addEventListener("message", event => {
-      if (typeof event.data !== "string") return;
-      const message = JSON.parse(event.data);
-      if (message.t === "snapshot") heard.run = message.tables.studio.run;
-      for (const [table, key, record] of message.t === "patch" ? message.ops : [])
-        if (table === "studio" && key === "run") heard.run = record;
-      if (message.t === "data" && message.value?.moves) heard.moves.push(...message.value.moves);
-    });
-  }
-};
+link.addEventListener("told", event => {
+  const message = JSON.parse(event.data);
+  if (message.t === "snapshot") heard.run = message.tables.studio.run;
+  for (const [table, key, record] of message.t === "patch" ? message.ops : [])
+    if (table === "studio" && key === "run") heard.run = record;
+  if (message.t === "data" && message.value?.moves) heard.moves.push(...message.value.moves);
+});
 const hasWord = () => {
   const word = document.querySelector(".live");
   return word !== null && !/away|connecting/.test(word.textContent) && document.querySelector("[data-node]") !== null;
@@ -74,7 +68,7 @@ class Looker(Person):
         self.context = browser.new_context(viewport=WINDOW, reduced_motion=motion)  # type: ignore[arg-type]
         self.context.set_default_timeout(PATIENCE_MS)
         page = self.context.new_page()
-        page.add_init_script(STOPWATCH)
+        page.add_init_script(LISTENING + STOPWATCH)
         began = time.time()
         super().__init__(page, address)
         self.ready_ms: float = page.evaluate("window.ready") - began * 1000

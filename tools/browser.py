@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Self
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page, ViewportSize
 
-__all__ = ["CHROMIUM", "WINDOW", "Person", "StudioProcess", "browsers", "reserved_port"]
+__all__ = ["CHROMIUM", "LISTENING", "WINDOW", "Person", "StudioProcess", "browsers", "reserved_port"]
 
 ROOT = Path(__file__).resolve().parents[1]
 CHROMIUM = next(
@@ -30,6 +30,25 @@ CHROMIUM = next(
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--disable-background-networking", "--disable-sync"]
 WINDOW: ViewportSize = {"width": 1440, "height": 900}
 _ENDS_S = 10.0
+
+LISTENING = """
+window.link = new EventTarget();
+window.WebSocket = class extends WebSocket {
+  constructor(...args) {
+    super(...args);
+    const tell = (what, data) => link.dispatchEvent(Object.assign(new Event(what), {data}));
+    this.addEventListener("open", () => tell("opened"));
+    this.addEventListener("close", () => tell("closed"));
+    this.addEventListener("message", event => typeof event.data === "string" && tell("told", event.data));
+    this.tell = tell;
+  }
+  send(data) {
+    this.tell("asked", data);
+    super.send(data);
+  }
+};
+"""
+"""For the page, before anything else: `link` has an event for each text that the page sends or is sent, as it is."""
 
 
 @contextmanager

@@ -30,27 +30,20 @@ _LOOK_EVERY_S = 0.02
 
 IN_THE_PAGE = """
 window.said = {isOpen: false, rev: -1, asked: new Set(), sentences: new Map()};
-window.WebSocket = class extends WebSocket {
-  constructor(...args) {
-    super(...args);
-    this.addEventListener("message", event => {
-      if (typeof event.data !== "string") return;
-      const message = JSON.parse(event.data);
-      if (["snapshot", "patch"].includes(message.t)) said.rev = message.rev;
-      if (["ack", "answer", "reject"].includes(message.t)) said.asked.delete(message.id);
-    });
-    this.addEventListener("open", () => said.isOpen = true);
-    this.addEventListener("close", () => {
-      said.isOpen = false;
-      said.asked.clear();
-    });
-  }
-  send(data) {
-    const {id} = JSON.parse(data);
-    if (id !== undefined) said.asked.add(id);
-    super.send(data);
-  }
-};
+link.addEventListener("told", event => {
+  const message = JSON.parse(event.data);
+  if (["snapshot", "patch"].includes(message.t)) said.rev = message.rev;
+  if (["ack", "answer", "reject"].includes(message.t)) said.asked.delete(message.id);
+});
+link.addEventListener("asked", event => {
+  const {id} = JSON.parse(event.data);
+  if (id !== undefined) said.asked.add(id);
+});
+link.addEventListener("opened", () => said.isOpen = true);
+link.addEventListener("closed", () => {
+  said.isOpen = false;
+  said.asked.clear();
+});
 const {setTimeout: later, clearTimeout: never} = window;
 let count = 0;
 window.setTimeout = (act, ms, ...more) => {
@@ -67,7 +60,10 @@ said.timePasses = () => {
   for (const [one, act] of said.sentences) said.sentences.delete(one), act();
 };
 """
-"""Notes what the page has asked and was told. Sentences that go by themselves wait for `Story.time_passes`."""
+"""After `LISTENING`: notes what the page has asked and was told.
+
+Sentences that go by themselves wait for `Story.time_passes`.
+"""
 
 
 class Bench:

@@ -17,7 +17,7 @@ from hfg.studio.palette import search_types
 from tests.limits import patience
 from tests.studio.stories.bench import IN_THE_PAGE, Bench, Story
 from tests.studio.stories.graphs import mission
-from tools.browser import CHROMIUM, WINDOW, browsers
+from tools.browser import CHROMIUM, LISTENING, WINDOW, browsers
 
 if TYPE_CHECKING:
     from playwright.sync_api import BrowserContext, Page
@@ -46,7 +46,7 @@ def chromium() -> Iterator[tuple[BrowserContext, asyncio.AbstractEventLoop]]:
         context = browser.new_context(viewport=WINDOW, reduced_motion="reduce")
         context.set_default_timeout(1000 * patience(5))
         context.grant_permissions(["clipboard-read", "clipboard-write"])
-        context.add_init_script(IN_THE_PAGE)
+        context.add_init_script(LISTENING + IN_THE_PAGE)
         loop = asyncio.get_running_loop()
         _set_running_loop(None)
         yield context, loop
