@@ -31,7 +31,7 @@ def _settle(page: Page) -> None:
 
 def _look_away(page: Page) -> None:
     """Move the mouse to where it marks nothing."""
-    page.mouse.move(1000, 560)
+    page.mouse.move(700, WINDOW["height"] - 8)
 
 
 def _arena(page: Page) -> None:
@@ -79,6 +79,14 @@ def _wire(page: Page) -> None:
     page.locator(".dragline .num").first.wait_for()
 
 
+def _tour(page: Page) -> None:
+    """The small graph that runs, and the first step of the tour."""
+    page.get_by_role("button", name="Take the tour").click()
+    page.get_by_role("dialog").wait_for()
+    page.locator("#stage .caption", has_text="the ball was seen at").wait_for()
+    _look_away(page)
+
+
 PICTURES: dict[str, Callable[[Page], None]] = {
     "arena": _arena,
     "mission": _mission,
@@ -86,25 +94,37 @@ PICTURES: dict[str, Callable[[Page], None]] = {
     "palette": _palette,
     "wire": _wire,
 }
+STARTS: dict[str, Callable[[Page], None]] = {"tour": _tour}
 
 
 def main() -> None:
-    """Start the studio on the robot, and take each picture in light and dark."""
+    """Start the studio on the robot, and on nothing, and take each picture in light and dark."""
     if not CHROMIUM:
         sys.exit("this needs Chromium on the path")
     FOLDER.mkdir(parents=True, exist_ok=True)
-    with StudioProcess(*ROBOT, "--run") as studio, browsers() as browser:
+    wanted = sys.argv[1:] or [*PICTURES, *STARTS]
+    for arguments, pictures in (((*ROBOT, "--run"), PICTURES), ((), STARTS)):
+        if pictures.keys() & wanted:
+            _take(arguments, pictures, wanted)
+
+
+def _take(arguments: tuple[str, ...], pictures: dict[str, Callable[[Page], None]], wanted: list[str]) -> None:
+    """Start the studio, do what comes before each picture that is wanted, and take it in both themes."""
+    last = [name for name in pictures if name in wanted][-1]
+    with StudioProcess(*arguments) as studio, browsers() as browser:
         page = browser.new_page(viewport=WINDOW, color_scheme="light")
         page.set_default_timeout(1000 * PATIENCE_S)
         page.goto(studio.address)
-        for name, act in PICTURES.items():
+        for name, act in pictures.items():
             act(page)
-            if sys.argv[1:] and name not in sys.argv[1:]:
+            if name not in wanted:
                 continue
             for theme in ("light", "dark"):
                 page.evaluate(f"document.querySelector('[aria-label=\"Show the {theme} theme\"]')?.click()")
                 _settle(page)
                 page.screenshot(path=FOLDER / f"{name}-{theme}.png")
+            if name == last:
+                return
 
 
 if __name__ == "__main__":

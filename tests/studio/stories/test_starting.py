@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Locator, expect
 
 import hfg
 from tests.studio.stories.bench import Story
@@ -20,6 +21,16 @@ STEPS = [
     ("Change it while it runs", None),
     ("When, and for how long", None),
 ]
+
+
+def is_next_to(step: Locator, node: Locator) -> bool:
+    """Whether a step of the tour is beside, above or below a node, and near."""
+    box, about = step.bounding_box(), node.bounding_box()
+    assert box is not None
+    assert about is not None
+    across = max(box["x"] - about["x"] - about["width"], about["x"] - box["x"] - box["width"])
+    down = max(box["y"] - about["y"] - about["height"], about["y"] - box["y"] - box["height"])
+    return 0 < max(across, down) < 60
 
 
 @pytest.fixture
@@ -43,10 +54,7 @@ def test_the_tour_has_five_steps_each_next_to_what_it_is_about(first: Story) -> 
         step = first.page.get_by_role("dialog", name=title)
         expect(step).to_be_visible()
         if node is not None:
-            box, about = step.bounding_box(), first.node(node).bounding_box()
-            assert box is not None
-            assert about is not None
-            assert abs(box["x"] - about["x"] - about["width"]) < 60
+            first.until(partial(is_next_to, step, first.node(node)), f"it stands next to {node}")
         step.get_by_role("button", name=re.compile("Next|Done")).click()
     expect(first.page.get_by_role("dialog")).to_have_count(0)
     expect(first.page.locator("#side h2").first).to_have_text("find")

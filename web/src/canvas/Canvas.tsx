@@ -4,7 +4,7 @@ import { useMemo, useRef } from "react";
 import { change, layoutKey, useStudio } from "../state/studio";
 import type { LayoutRecord } from "../protocol/types";
 import { enter } from "../state/actions";
-import { isInside } from "../state/paths";
+import { isInside, parentOf } from "../state/paths";
 import { counted, plural } from "../ui/words";
 import { AskedWires } from "./AskedWires";
 import { Annotations } from "./Annotations";
@@ -98,9 +98,16 @@ function Inner() {
       <ValueTip />
       {layout?.view === "activity" && <ActivityLegend layout={layout} />}
       <Zoomer showAll={view.showAll} />
-      {layout?.nodes.length === 0 && <p className="nothing-here">Nothing here yet. Press Tab, or click twice, to add a node.</p>}
+      {layout?.nodes.length === 0 && <NothingHere />}
     </main>
   );
+}
+
+/** Either there are no nodes, or the view shows none of them. */
+function NothingHere() {
+  const hasNodes = useStudio((s) => Object.keys(s.tables.nodes).some((path) => path !== s.level && parentOf(path) === s.level));
+  const says = hasNodes ? "No node here takes part in activity. Press 3 to see all edges." : "Nothing here yet. Press Tab, or click twice, to add a node.";
+  return <p className="nothing-here">{says}</p>;
 }
 
 const NO_EDGES: never[] = [];

@@ -30,7 +30,10 @@ export function FarOverlay({ layout }: { layout: LayoutRecord }) {
         const at = place(box);
         const inside = activeInside(activity, box.id);
         const active = box.id in activity.since || inside !== null;
-        if (box.is_open || !active) return box.kind === "subgraph" && <FarFrame key={box.id} box={box} at={at} active={active} />;
+        if (box.is_open || !active) {
+          const roomy = box.is_open && headroom(box, layout) * view.zoom >= NAME_HEIGHT + 4;
+          return box.kind === "subgraph" && <FarFrame key={box.id} box={box} at={at} active={active} roomy={roomy} />;
+        }
         return <FarActive key={box.id} at={at} says={words(inside ?? box.id, level)} go={() => (inside ? show(inside) : layout.deep ? show(box.id) : enter(box.id))} />;
       })}
       <FarLegend layout={layout} />
@@ -56,13 +59,19 @@ function FarActive({ at, says, go }: { at: At; says: string; go: () => void }) {
   );
 }
 
+const NAME_HEIGHT = 13;
+
+/** How much is free between the upper edge of an open subgraph and the nodes in it. */
+const headroom = (box: NodeBox, layout: LayoutRecord): number =>
+  Math.min(...layout.nodes.filter((one) => isInside(one.id, box.id)).map((one) => one.y)) - box.y;
+
 /** A subgraph: its name if there is room, and its outline if one sees what is in it. */
-function FarFrame({ box, at, active }: { box: NodeBox; at: At; active: boolean }) {
+function FarFrame({ box, at, active, roomy }: { box: NodeBox; at: At; active: boolean; roomy: boolean }) {
   return (
     <>
       {box.is_open && <div className={active ? "far-frame on" : "far-frame"} style={at} />}
       {at.width > 40 && (
-        <span className={active ? "far-name on" : "far-name"} style={{ left: at.left, top: at.top - 13, maxWidth: at.width }}>
+        <span className={active ? "far-name on" : "far-name"} style={{ left: at.left + (roomy ? 4 : 0), top: at.top + (roomy ? 2 : -NAME_HEIGHT), maxWidth: at.width }}>
           {box.name}
         </span>
       )}

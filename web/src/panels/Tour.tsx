@@ -34,9 +34,9 @@ const STEPS: Step[] = [
     text: "There is no state machine. The node that has the activity is the state, and hands it on over a double line. Double click a subgraph to see what goes on inside.",
   },
   {
-    at: () => nodeElement(worker())?.parentElement?.querySelector('[data-kind="output"], [data-kind="event"]'),
+    at: () => nodeElement(worker()),
     title: "Draw a line from a port",
-    text: "Ports that take it light up, all others say why not. Drop it on nothing to choose a node that fits.",
+    text: "Press on one of its squares or circles, and drag. Ports that take it light up, all others say why not. Drop it on nothing to choose a node that fits.",
   },
   {
     before: () => {
@@ -65,8 +65,10 @@ export function Tour() {
   useEffect(() => step.before?.(), [step]);
   useLayoutEffect(() => {
     const look = () => {
-      const box = step.at()?.getBoundingClientRect();
-      if (box) setPlace(placeOf(box, root.current?.offsetHeight ?? 160, window.innerWidth, window.innerHeight));
+      const about = step.at();
+      if (!about) return;
+      const others = [...document.querySelectorAll("#canvas .node")].filter((one) => one !== about).map((one) => one.getBoundingClientRect());
+      setPlace(placeOf(about.getBoundingClientRect(), root.current?.offsetHeight ?? 160, window.innerWidth, window.innerHeight, others));
     };
     look();
     const timer = setInterval(look, LOOK_EVERY_MS);
@@ -74,7 +76,7 @@ export function Tour() {
   }, [step]);
   const leave = () => change({ popover: null });
   return (
-    <div className={`pop coach ${place.side}`} ref={root} style={{ left: place.left, top: place.top, position: "fixed" }} role="dialog" aria-label={step.title}>
+    <div className={`pop coach at-${place.side}`} ref={root} style={{ left: place.left, top: place.top, position: "fixed" }} role="dialog" aria-label={step.title}>
       <h4>{step.title}</h4>
       <p>{step.text}</p>
       <div className="row">

@@ -4,7 +4,7 @@ import { nameOf } from "../state/paths";
 import { studio } from "../state/studio";
 import { colour } from "../ui/colours";
 import { percent } from "../ui/words";
-import { icicle, type Piece, steps, tickStep, withoutCommon } from "./icicle";
+import { icicle, type Lane, lanesOf, type Piece, steps, tickStep } from "./icicle";
 import { type Box, record, useWindow } from "./store";
 
 export const GUTTER = 136;
@@ -12,7 +12,6 @@ const RIGHT = 12;
 const ROW = 17;
 const LANE = 19;
 const TOP = 42;
-const LANES = TOP + 3 * ROW + 4;
 const SLOWEST_S = 0.006;
 /** A ring around less hides it. */
 const RING_PX = 6;
@@ -75,11 +74,11 @@ class Drawing {
     this.c.fillStyle = colour("surface");
     this.c.fillRect(0, 0, this.width, this.height);
     this.c.textBaseline = "middle";
-    const { spans, prefix } = withoutCommon(record.spans);
-    this.overview(steps(spans, record.now, record.cursor), prefix);
+    const lanes = lanesOf(record.spans, record.now);
+    this.overview(lanes);
     this.axis();
-    this.activity(icicle(spans, scale.begin, record.now, 3, record.cursor), prefix);
-    if (this.height > 110) this.lanes();
+    const below = this.activity(lanes);
+    if (this.height > 110) this.groups(below + 4);
     this.playhead();
   }
 
@@ -97,22 +96,26 @@ class Drawing {
     return this.c.measureText(words).width + 8 < width;
   }
 
-  private overview(pieces: Piece[], prefix: string): void {
+  private overview(lanes: Lane[]): void {
     this.text("whole run", 12, 14, "ink3");
     const whole = Math.max(record.now, 1e-6);
     const room = this.width - GUTTER - RIGHT;
     const at = (time: number) => GUTTER + (Math.min(time, whole) / whole) * room;
     this.c.fillStyle = colour("surface2");
     this.c.fillRect(GUTTER, 6, room, 16);
-    for (const step of pieces) {
-      const left = at(step.begin);
-      const wide = Math.max(1.5, at(step.end) - left);
-      this.c.fillStyle = colour(step.now ? "on" : "line2");
-      this.c.fillRect(left, 6, Math.max(1, wide - 1), 16);
-      this.c.font = `500 11px ${colour("font")}`;
-      if (this.fits(step.name, wide)) this.text(step.name, left + 4, 14.5, step.now ? "on-text" : "ink", 500);
-      targets.push({ x: left, y: 6, width: wide, height: 16, path: full(prefix, step.path) });
-    }
+    const height = 16 / Math.max(1, lanes.length);
+    lanes.forEach(({ spans, prefix }, index) => {
+      const y = 6 + index * height;
+      for (const step of steps(spans, record.now, record.cursor)) {
+        const left = at(step.begin);
+        const wide = Math.max(1.5, at(step.end) - left);
+        this.c.fillStyle = colour(step.now ? "on" : "line2");
+        this.c.fillRect(left, y, Math.max(1, wide - 1), lanes.length > 1 ? height - 1 : height);
+        this.c.font = `500 11px ${colour("font")}`;
+        if (lanes.length === 1 && this.fits(step.name, wide)) this.text(step.name, left + 4, 14.5, step.now ? "on-text" : "ink", 500);
+        targets.push({ x: left, y, width: wide, height, path: full(prefix, step.path) });
+      }
+    });
     this.c.strokeStyle = colour("you");
     this.c.lineWidth = 2;
     const left = at(Math.max(0, scale.begin));
@@ -135,11 +138,17 @@ class Drawing {
     }
   }
 
-  private activity(rows: Piece[][], prefix: string): void {
-    this.text("activity", 12, TOP + 9, "ink2", 600);
-    rows.forEach((pieces, row) => {
-      for (const piece of pieces) this.piece(piece, TOP + row * ROW, full(prefix, piece.path));
+  /** Three rows for what follows each other; fewer for each of what goes on at the same time. */
+  private activity(lanes: Lane[]): number {
+    const rows = lanes.length < 2 ? 3 : lanes.length === 2 ? 2 : 1;
+    lanes.forEach(({ spans, prefix }, lane) => {
+      const top = TOP + lane * rows * ROW;
+      this.text(lanes.length > 1 && prefix !== "" ? nameOf(prefix) : "activity", 12, top + 9, "ink2", 600);
+      icicle(spans, scale.begin, record.now, rows, record.cursor).forEach((pieces, row) => {
+        for (const piece of pieces) this.piece(piece, top + row * ROW, full(prefix, piece.path));
+      });
     });
+    return TOP + Math.max(1, lanes.length) * rows * ROW;
   }
 
   private piece(piece: Piece, y: number, path: string): void {
@@ -157,10 +166,10 @@ class Drawing {
     targets.push({ x: left, y, width: wide, height: ROW - 2, path });
   }
 
-  private lanes(): void {
+  private groups(top: number): void {
     const tables = studio().tables;
     const groups = Object.values(tables.groups).sort((a, b) => a.number - b.number);
-    const rows = new Map(groups.map((group, index) => [group.name, LANES + index * LANE]));
+    const rows = new Map(groups.map((group, index) => [group.name, top + index * LANE]));
     const loads = useLoad.getState().load?.groups ?? {};
     for (const group of groups) {
       const y = rows.get(group.name)!;

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { icicle, steps, tickStep, withoutCommon } from "./icicle";
+import { icicle, lanesOf, steps, tickStep, withoutCommon } from "./icicle";
 import type { Span } from "./store";
 
 const SPANS: Span[] = [
@@ -33,6 +33,23 @@ it("a level that all spans share is left out", () => {
   const { spans, prefix } = withoutCommon([["r/a", 0, 1], ["r/b/c", 1, 2]]);
   expect(prefix).toBe("r");
   expect(spans.map((one) => one[0])).toEqual(["a", "b/c"]);
+});
+
+describe("what is active at the same time", () => {
+  it("has a lane of its own, named after the subgraph around it", () => {
+    const lanes = lanesOf([["x/robot_0/fetch/go", 0, 2], ["x/robot_1/advance", 0, 1], ["x/robot_1/fetch", 1, null]], 3);
+    expect(lanes.map((one) => [one.prefix, one.spans.map(([path]) => path)])).toEqual([
+      ["x/robot_0", ["fetch/go"]],
+      ["x/robot_1", ["advance", "fetch"]],
+    ]);
+  });
+  it("has one lane if it follows each other, or overlaps only while it is handed over", () => {
+    expect(lanesOf([["fetch", 0, 1.02], ["bring", 1, 2], ["fetch", 2, null]], 3)).toHaveLength(1);
+  });
+  it("has four lanes at most", () => {
+    const lanes = lanesOf(["a", "b", "c", "d", "e"].map((path) => [path, 0, 1]), 1);
+    expect(lanes.map((one) => one.spans.length)).toEqual([1, 1, 1, 2]);
+  });
 });
 
 it("ticks are wide enough to be read", () => {

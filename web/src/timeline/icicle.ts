@@ -53,6 +53,57 @@ export function withoutCommon(spans: readonly Span[]): { spans: Span[]; prefix: 
   return { spans: spans.map(([path, begin, end]) => [path.slice(length), begin, end]), prefix: prefix.join("/") };
 }
 
+export interface Lane {
+  /** Where all of it is; the paths are given without it. */
+  prefix: string;
+  spans: Span[];
+}
+
+/** More than these would leave no room for the groups; what is left over shares the last one. */
+const MOST_LANES = 4;
+
+/** What was active at the same time goes into lanes of its own, such as each of two robots; what follows each other into one. */
+export function lanesOf(spans: readonly Span[], now: number): Lane[] {
+  const { spans: short, prefix } = withoutCommon(spans);
+  const tops = new Map<string, Span[]>();
+  for (const span of short) {
+    const top = span[0].split("/")[0]!;
+    const own = tops.get(top);
+    if (own) own.push(span);
+    else tops.set(top, [span]);
+  }
+  const together = concurrent(short, now);
+  const lanes: string[][] = [];
+  for (const top of tops.keys()) {
+    const free = lanes.find((lane) => lane.every((one) => !together.has(`${one}/${top}`)));
+    if (free) free.push(top);
+    else if (lanes.length < MOST_LANES) lanes.push([top]);
+    else lanes.at(-1)!.push(top);
+  }
+  if (lanes.length === 1) return [{ prefix, spans: short }];
+  return lanes.map((lane) => {
+    const inside = lane.flatMap((top) => tops.get(top)!);
+    const top = lane[0]!;
+    if (lane.length > 1 || inside.some(([path]) => path === top)) return { prefix, spans: inside };
+    const own = inside.map(([path, begin, end]): Span => [path.slice(top.length + 1), begin, end]);
+    return { prefix: prefix === "" ? top : `${prefix}/${top}`, spans: own };
+  });
+}
+
+/** Pairs of first names that were active at the same time for longer than handing over takes, as "a/b" and "b/a". */
+function concurrent(spans: readonly Span[], now: number): Set<string> {
+  const found = new Set<string>();
+  const ends = new Map<string, number>();
+  for (const [path, begin, end] of [...spans].sort((a, b) => a[1] - b[1])) {
+    const top = path.split("/")[0]!;
+    for (const [other, until] of ends) {
+      if (other !== top && Math.min(until, end ?? now) - begin > GAP_S) found.add(`${top}/${other}`).add(`${other}/${top}`);
+    }
+    ends.set(top, Math.max(ends.get(top) ?? 0, end ?? now));
+  }
+  return found;
+}
+
 export function tickStep(length: number): number {
   if (length > 20_000) return 3600;
   if (length > 3000) return 600;
