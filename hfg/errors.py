@@ -33,7 +33,7 @@ was expected, what was found, and what to do.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Final, Literal, NamedTuple
 
 import msgspec
@@ -202,7 +202,15 @@ class SharedMemoryError(HfgError):
 
 
 class TargetError(HfgError):
-    """The TARGET of `hfg run` cannot be found or imported, or is not a graph."""
+    """The TARGET of `hfg run` cannot be found or imported, or is not a graph.
+
+    Attributes:
+      choices: the names of the graphs that code holds, if the TARGET names none of several.
+    """
+
+    def __init__(self, message: str, choices: Iterable[str] = ()) -> None:
+        super().__init__(message)
+        self.choices = tuple(choices)
 
 
 class RunError(HfgError):

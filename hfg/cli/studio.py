@@ -8,7 +8,8 @@ import html
 import tempfile
 import threading
 import webbrowser
-from collections.abc import Awaitable, Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -85,8 +86,14 @@ def _of_graph(target: str | None, param: list[str] | None, flags: LoadFlags, *, 
     file = _file_of(target)
     folder = Path.cwd() if file is None else file.resolve().parent
     allow = flags.allow or ()
-    project = Project(graph, folder, file, allow=allow, read=lambda path: load_graph(str(path), [], allow))
+    name = "" if file is None or target is None else target.removeprefix(str(file)).removeprefix(":")
+    project = Project(graph, folder, file, name=name, allow=allow, read=partial(read_target, allow=allow))
     return Studio(project, read_only=read_only, target=target or graph.name, level=inside)
+
+
+def read_target(target: str, allow: Sequence[str] | None = None) -> Graph:
+    """Read another file while the studio serves; code imports what it likes, so `allow` is for graph files."""
+    return load_graph(target, [], allow if target.endswith((".yaml", ".yml")) else None)
 
 
 def _why(read_only: bool) -> str:

@@ -195,7 +195,7 @@ def _only(module: ModuleType, place: str, has_arguments: bool) -> Any:
             return next(iter(candidates.values()))
         if candidates:
             choices = ", ".join(f"{place}:{name}" for name in candidates)
-            raise TargetError(f"{place} has {len(candidates)} graphs: name one of {choices}")
+            raise TargetError(f"{place} has {len(candidates)} graphs: name one of {choices}", candidates)
     raise TargetError(
         f"{place} has no graph: it needs a Graph, or a function without arguments that is annotated to return one"
     )

@@ -350,7 +350,7 @@ class Ack(msgspec.Struct, frozen=True, tag="ack", tag_field="t"):
 
 
 class Reject(msgspec.Struct, frozen=True, tag="reject", tag_field="t"):
-    """It is refused; `message` is the whole sentence, the others are parts of it."""
+    """It is refused; `message` is the whole sentence, the others are parts of it, and names of which one helps."""
 
     id: int
     code: str
@@ -360,6 +360,7 @@ class Reject(msgspec.Struct, frozen=True, tag="reject", tag_field="t"):
     sent: str = ""
     reason: str = ""
     remedy: str = ""
+    choices: tuple[str, ...] = ()
 
 
 class Answer(msgspec.Struct, frozen=True, tag="answer", tag_field="t"):

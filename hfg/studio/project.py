@@ -48,8 +48,9 @@ class Project:
         folder: Path,
         file: Path | None = None,
         *,
+        name: str = "",
         allow: Iterable[str] = (),
-        read: Callable[[Path], Graph] | None = None,
+        read: Callable[[str], Graph] | None = None,
         keep: bool = True,
     ) -> None:
         """Take a graph that was read already.
@@ -58,15 +59,17 @@ class Project:
           graph: the whole graph.
           folder: nothing outside of it is opened or written.
           file: where the graph comes from.
+          name: of the graph in the file, if that is code with several.
           allow: packages that files and commands may import besides.
-          read: reads a file; by default only graph files.
+          read: reads a file, or the graph of a name in it, "file.py:name"; by default only graph files.
           keep: keep unsaved edits in a journal; not for a run that another program has begun.
         """
         self.graph = graph
         self.folder = folder.resolve()
         self.file = None if file is None else file.resolve()
         self.allow = tuple(allow)
-        self._read = read or (lambda path: load(path, allow=self.allow))
+        self._name = name
+        self._read = read or (lambda target: load(target, allow=self.allow))
         self._saved: Transaction | None = None
         self._dirty_from_start = 0
         self._print = self._fingerprint()
@@ -154,18 +157,20 @@ class Project:
         return found
 
     def open(self, path: str, *, discard: bool) -> None:
-        """Take another file's graph; without a path an empty one.
+        """Take another file's graph, of code also "file.py:name"; without a path an empty one.
 
         Raises:
           Refused: there are unsaved edits, or it is outside of the folder.
           FileError: it holds no graph.
+          TargetError: it is code without a graph, or with several; `choices` are their names.
         """
         if not path:
             self.begin(Graph("graph"), discard=discard)
             return
         self.need_saved(discard)
-        file = self.existing(path)
-        self._take(self._read(file), file)
+        place, name = _split(path)
+        file = self.existing(place)
+        self._take(self._read(_target(file, name)), file, name)
 
     def existing(self, path: str) -> Path:
         """Return the path of a file inside the folder.
@@ -193,16 +198,16 @@ class Project:
             raise Refused("file", "the graph has no file that could be read again; save it first")
         if not self.file.is_file():
             raise Refused("file", f"{self.file.name} is no longer a file")
-        self._take(self._read(self.file), self.file)
+        self._take(self._read(_target(self.file, self._name)), self.file, self._name)
 
     def need_saved(self, discard: bool) -> None:
         """Refuse to lose edits, unless they are given up."""
         if self.changes and not discard:
             raise Refused("changed", f"{_count(self.changes)} would be lost; save first, or discard them")
 
-    def _take(self, graph: Graph, file: Path | None) -> None:
+    def _take(self, graph: Graph, file: Path | None, name: str = "") -> None:
         self.journal.drop()
-        self.graph, self.file = graph, file
+        self.graph, self.file, self._name = graph, file, name
         self._now_saved()
         self.journal = self._new_journal()
 
@@ -229,7 +234,7 @@ class Project:
             raise Refused("changed", f"{file.name} is there already; overwrite it, or choose another name")
         save(self.graph, file)
         self.journal.drop()
-        self.file = file
+        self.file, self._name = file, ""
         self._now_saved()
         self.journal = self._new_journal()
 
@@ -302,7 +307,7 @@ class RecordedProject(Project):
         folder: Path | None = None,
         *,
         allow: Iterable[str] = (),
-        read: Callable[[Path], Graph] | None = None,
+        read: Callable[[str], Graph] | None = None,
     ) -> None:
         super().__init__(graph, folder or file.resolve().parent, allow=allow, read=read, keep=False)
         self._recording = file.resolve()
@@ -317,6 +322,16 @@ class RecordedProject(Project):
     @override
     def graph_project(self) -> Project:
         return Project(Graph("graph"), self.folder, allow=self.allow, read=self._read)
+
+
+def _split(path: str) -> tuple[str, str]:
+    """Return a path, and the name behind its colon, if it leads to code."""
+    place, colon, name = path.rpartition(":")
+    return (place, name) if colon and place.endswith(".py") else (path, "")
+
+
+def _target(file: Path, name: str) -> str:
+    return f"{file}:{name}" if name else str(file)
 
 
 def _kind(file: Path) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hfg import errors
-from hfg.errors import CheckFailed, FileError, GraphError, HfgError, NodeError, UsageError, in_words
+from hfg.errors import CheckFailed, FileError, GraphError, HfgError, NodeError, TargetError, UsageError, in_words
 from hfg.studio.messages import Reject
 
 __all__ = ["Refused", "parts_of", "reject"]
@@ -21,7 +21,9 @@ class Refused(UsageError):
 def reject(number: int, error: BaseException) -> Reject:
     """Return the answer to a request that failed with this error."""
     parts = parts_of(error)
-    return Reject(number, _code(error), str(error) if isinstance(error, HfgError) else in_words(error), **parts)
+    choices = error.choices if isinstance(error, TargetError) else ()
+    sentence = str(error) if isinstance(error, HfgError) else in_words(error)
+    return Reject(number, _code(error), sentence, **parts, choices=choices)
 
 
 def parts_of(error: BaseException) -> dict[str, str]:

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg.cli.studio import read_target
 from hfg.studio.project import Project
 from hfg.studio.studio import Studio
 from tests.studio.page import Page, live
@@ -56,6 +57,35 @@ def test_a_graph_of_code_is_saved_under_the_name_of_a_graph_file(tmp_path: Path)
         assert (await page.ask("save", path="mine.py"))["code"] == "file"
         assert (await page.ask("save", path="mine.hfg.yaml"))["t"] == "ack"
         assert of_file(page)["path"] == "mine.hfg.yaml"
+
+    live(main)
+
+
+TWO = """
+import hfg
+
+def one() -> hfg.Graph:
+    return hfg.Graph("one")
+
+def other() -> hfg.Graph:
+    return hfg.Graph("other")
+"""
+
+
+def test_a_graph_of_code_with_several_is_opened_by_its_name_and_read_again(tmp_path: Path) -> None:
+    async def main() -> None:
+        (tmp_path / "two_graphs.py").write_text(TWO)
+        project = Project(doubling(), tmp_path, read=read_target)
+        page = Page(Studio(project)).join()
+        refusal = await page.ask("open", path="two_graphs.py")
+        assert refusal["choices"] == ["one", "other"]
+        assert "name one of" in refusal["message"]
+        assert (await page.ask("open", path="two_graphs.py:other"))["t"] == "ack"
+        assert (of_file(page)["graph"], of_file(page)["path"]) == ("other", "two_graphs.py")
+        assert (await page.ask("reread"))["t"] == "ack"
+        assert of_file(page)["graph"] == "other"
+        assert 'has no "third"; it has one, other' in (await page.ask("open", path="two_graphs.py:third"))["message"]
+        assert (await page.ask("open", path="../two_graphs.py:one"))["code"] == "file"
 
     live(main)
 

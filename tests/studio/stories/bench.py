@@ -7,10 +7,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import hfg
+from hfg.cli.studio import read_target
 from hfg.studio.project import Project, RecordedProject
 from hfg.studio.recorded import Recorded
 from hfg.studio.refusing import Refused
@@ -107,7 +109,8 @@ class Bench:
     ) -> None:
         """Begin the studio of a story."""
         recorded = None if recording is None else Recorded(recording)
-        project = Project(graph, folder, file, allow=("tests.studio.stories",))
+        allow = ("tests.studio.stories",)
+        project = Project(graph, folder, file, allow=allow, read=partial(read_target, allow=allow))
         if recorded is not None and recording is not None:
             project = RecordedProject(recorded.graph_after(0), recording)
         self.studio = self.call(lambda: Studio(project, read_only=read_only, recorded=recorded))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
@@ -73,3 +75,17 @@ def test_the_view_of_activity_says_so_if_no_node_has_any(open_studio: Open) -> N
     expect(story.page.locator("#canvas")).to_contain_text("No node here takes part in activity.")
     story.press("3")
     expect(story.node("v_k")).to_be_visible()
+
+
+def test_code_with_several_graphs_is_opened_by_the_name_of_one(open_studio: Open, tmp_path: Path) -> None:
+    shutil.copy(activity.__file__, tmp_path / "paper.py")
+    story = open_studio(hfg.Graph("graph"))
+    story.page.get_by_role("button", name="paper.py").click()
+    dialog = story.page.get_by_role("dialog")
+    expect(dialog.locator("h2")).to_have_text("Graphs in paper.py")
+    dialog.get_by_role("button", name="figure_13").click()
+    expect(dialog).to_have_count(0)
+    expect(story.page.locator(".crumbs")).to_contain_text("figure 13")
+    expect(story.node("v_b")).to_be_visible()
+    story.press("Control+o")
+    expect(dialog.locator("h2")).to_contain_text("Files in")

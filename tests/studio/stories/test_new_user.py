@@ -80,6 +80,7 @@ def test_a_graph_that_finds_coins_is_built_from_nothing_and_one_parameter_tuned_
     story.select("draw_circles")
     expect(side.locator(".prt", has_text="circles").locator(".v")).to_have_text("silent")  # none are found yet
     story.select("hough_circles")
+    story.settle()
     box = story.page.locator('[data-slider="param2"]').bounding_box()
     assert box is not None
     mouse = story.page.mouse

@@ -48,6 +48,16 @@ def test_one_click_shows_a_graph_that_runs_with_what_its_camera_sees(first: Stor
     expect(first.page.locator("#stage .caption")).to_contain_text("the ball was seen at")
 
 
+def test_what_one_opens_while_a_starter_begins_stays_open(first: Story) -> None:
+    first.page.get_by_role("button", name="Run it").click()
+    first.node("camera").wait_for()
+    with first.bench.held():
+        first.press("Control+k")
+    first.bench.state("running")
+    first.settle()
+    expect(first.page.get_by_role("dialog", name="Find or do anything")).to_be_visible()
+
+
 def test_the_tour_has_five_steps_each_next_to_what_it_is_about(first: Story) -> None:
     first.page.get_by_role("button", name="Take the tour").click()
     for title, node in STEPS:

@@ -29,7 +29,10 @@ function PortRow({ port }: { port: PortRecord }) {
   useEffect(() => {
     const subscription = socket.subscribe("value", { path: port.path }, 4, (next) => {
       const one = next as Value | null;
-      if (value.current) value.current.textContent = one === null || one.kind === "none" ? "" : one.kind === "marker" ? "silent" : one.summary;
+      if (value.current) {
+        value.current.textContent = one === null || one.kind === "none" ? "" : one.kind === "marker" ? "silent" : one.summary;
+        value.current.title = value.current.textContent;
+      }
       if (speed.current) speed.current.textContent = one !== null && one.seen > 0 ? rate(one.rate_hz) : "never";
     });
     return subscription.end;
@@ -42,7 +45,7 @@ function PortRow({ port }: { port: PortRecord }) {
         <button type="button" title={pinned ? "unpin" : "pin a probe"} aria-pressed={pinned} onClick={() => pin(port.path)}>
           {port.name}
         </button>
-        <em>{port.type}</em>
+        <em title={port.type}>{port.type}</em>
       </span>
       <span className="v num" ref={value} />
       <span className="r num" ref={speed} />

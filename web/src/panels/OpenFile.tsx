@@ -1,5 +1,5 @@
 import { useEffect, useState } from "react";
-import { ask, question, save, tell, toast } from "../state/actions";
+import { openFile, question, save, tell, toast } from "../state/actions";
 import { change, useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
 
@@ -14,45 +14,43 @@ export function OpenFile() {
   const file = useStudio((s) => s.tables.studio.file);
   const [folder, setFolder] = useState<Folder | null>(null);
   const [name, setName] = useState(file?.kind === "yaml" ? file.name : "");
+  const several = useStudio((s) => s.several);
   const close = () => change({ popover: null });
   const look = (path: string) => {
     question<Folder>("folder", { path }).then(setFolder, (error: Error) => toast(error.message, { kind: "bad" }));
   };
-  useEffect(() => look(""), []);
+  useEffect(() => {
+    look("");
+    return () => change({ several: null });
+  }, []);
   const inside = (one: string) => (folder?.path ? `${folder.path}/${one}` : one);
   const open = async (path: string) => {
     const lost = (file?.changes ?? 0) > 0;
     if (lost && !window.confirm(`${file!.changes} changes of ${file!.name} are not saved. Open ${path} and lose them?`)) return;
-    if ((await ask({ t: "open", path, discard: lost })) !== null) close();
+    await openFile(path, lost);
   };
   return (
     <div className="veil" onPointerDown={(event) => event.target === event.currentTarget && close()}>
       <div className="pop dialog grows" role="dialog" aria-label="Open or save">
-        <h2>Files in {file?.folder ?? "the folder"}</h2>
-        <ul className="list" style={{ maxHeight: 280, overflow: "auto" }}>
-          {folder?.path && (
-            <li>
-              <button type="button" className="btn" onClick={() => look(folder.path.split("/").slice(0, -1).join("/"))}>
-                up
-              </button>
-            </li>
-          )}
-          {folder?.folders.map((one) => (
-            <li key={one}>
-              <button type="button" className="btn" onClick={() => look(inside(one))}>
-                {one}/
-              </button>
-            </li>
-          ))}
-          {folder?.files.map((one) => (
-            <li key={one.name}>
-              <button type="button" className="btn" onClick={() => void open(inside(one.name))}>
-                <Icon name="file" /> {one.name}
-              </button>
-              <span className="muted">{one.kind}</span>
-            </li>
-          ))}
-        </ul>
+        <h2>{several ? `Graphs in ${several.path}` : `Files in ${file?.folder ?? "the folder"}`}</h2>
+        {several ? (
+          <ul className="list">
+            <Row label="back" onClick={() => change({ several: null })} />
+            {several.names.map((one) => (
+              <Row key={one} label={one} icon="file" onClick={() => void open(`${several.path}:${one}`)} />
+            ))}
+          </ul>
+        ) : (
+          <ul className="list">
+            {folder?.path && <Row label="up" onClick={() => look(folder.path.split("/").slice(0, -1).join("/"))} />}
+            {folder?.folders.map((one) => (
+              <Row key={one} label={`${one}/`} onClick={() => look(inside(one))} />
+            ))}
+            {folder?.files.map((one) => (
+              <Row key={one.name} label={one.name} icon="file" kind={one.kind} onClick={() => void open(inside(one.name))} />
+            ))}
+          </ul>
+        )}
         <label htmlFor="save-as">Save as</label>
         <div className="fld">
           <input id="save-as" autoFocus value={name} onKeyDown={(event) => event.key === "Enter" && name !== "" && void save(inside(named(name))).then((done) => done && close())} placeholder="name.hfg.yaml" onChange={(event) => setName(event.target.value)} />
@@ -71,6 +69,17 @@ export function OpenFile() {
         </div>
       </div>
     </div>
+  );
+}
+
+function Row({ label, icon, kind, onClick }: { label: string; icon?: "file"; kind?: string; onClick: () => void }) {
+  return (
+    <li>
+      <button type="button" className="btn" onClick={onClick}>
+        {icon && <Icon name={icon} />} {label}
+      </button>
+      {kind && <span className="muted">{kind}</span>}
+    </li>
   );
 }
 

@@ -1,9 +1,9 @@
 import { useEffect, useState } from "react";
-import { ask, question } from "../state/actions";
+import { ask, openFile, question } from "../state/actions";
 import { change, type Popover, useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
 import { plural } from "../ui/words";
-import { CARD_PICTURES, STARTER_PICTURES } from "./pictures";
+import { STARTER_PICTURES } from "./pictures";
 
 interface Starter {
   name: string;
@@ -21,12 +21,13 @@ interface Start {
 }
 
 const MOST_CARDS = 12;
+const KINDS: Record<string, string> = { yaml: "graph file", python: "code", recording: "recording" };
 const NOTHING: Start = { folder: "", files: [], runs: [], starters: [] };
 
 /** Opens a graph that the studio offers, and lets it run. */
 async function begin(starter: string, then: Popover = null): Promise<void> {
   if ((await ask({ t: "open", starter })) === null) return;
-  if ((await ask({ t: "start", stay: true })) !== null) change({ popover: then });
+  if ((await ask({ t: "start", stay: true })) !== null && then !== null) change({ popover: then });
 }
 
 /** Nothing is open: a graph that runs at once, what can be opened here, and an empty graph. */
@@ -75,12 +76,11 @@ export function StartPage() {
         <h2 className="start-head">In this folder</h2>
         {files.length === 0 && <p className="second">No graph files yet. What you save appears here.</p>}
         <div className="cards">
-          {files.map((one, index) => (
-            <button type="button" className="card" key={one.name} onClick={() => void ask({ t: "open", path: one.name, discard: false })}>
-              <span className="pic">{CARD_PICTURES[index % CARD_PICTURES.length]}</span>
+          {files.map((one) => (
+            <button type="button" className="card" key={one.name} onClick={() => void openFile(one.name)}>
               <span className="tx">
                 <b>{one.name}</b>
-                <p>{one.kind === "yaml" ? "graph file" : one.kind}</p>
+                <p>{KINDS[one.kind] ?? one.kind}</p>
               </span>
             </button>
           ))}

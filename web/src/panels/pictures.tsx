@@ -57,18 +57,6 @@ const Signal = (
   </Frame>
 );
 
-const Mission = (
-  <Frame>
-    <Double d="M120 32V52" />
-    <Double d="M120 80V100" />
-    <Box x={80} y={4} w={80} name="fetch" />
-    <Box x={80} y={52} w={80} name="bring" active />
-    <Box x={80} y={100} w={80} name="deliver" />
-    <Circle x={120} y={52} />
-    <Circle x={120} y={100} />
-  </Frame>
-);
-
 /** What the camera sees, and the mission that follows it. */
 const Ball = (
   <svg width="404" height="232" viewBox="0 0 404 232" aria-hidden="true">
@@ -96,6 +84,3 @@ const Ball = (
 );
 
 export const STARTER_PICTURES: Record<string, ReactNode> = { ball: Ball, two_nodes: Two, start_signal: Signal };
-
-/** For files, of which one knows nothing before they are opened. */
-export const CARD_PICTURES: ReactNode[] = [Mission, Two, Signal];

@@ -332,6 +332,7 @@ export interface Reject {
   sent: string;
   reason: string;
   remedy: string;
+  choices: string[];
 }
 
 export type Op = [table: string, key: string, record: unknown];

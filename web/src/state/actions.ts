@@ -65,6 +65,18 @@ export async function redo(): Promise<void> {
   if ((await tell("redo")) !== null && last) toast(`Done again: ${last.text}`, {}, 2000);
 }
 
+/** Opens a file; of code with several graphs one is chosen then. */
+export async function openFile(path: string, discard = false): Promise<void> {
+  try {
+    await socket.request({ t: "open", path, discard });
+    change({ popover: null });
+  } catch (error) {
+    const names = error instanceof Refusal ? error.reject.choices : [];
+    if (names.length > 0) change({ popover: "open", several: { path, names } });
+    else toast(error instanceof Error ? error.message : String(error), { kind: error instanceof Refusal ? "bad" : "warn" });
+  }
+}
+
 // --- where the person looks ---
 
 export function enter(path: string): void {

@@ -72,6 +72,8 @@ export interface Studio {
   tab: Tab;
   panel: Panel;
   popover: Popover;
+  /** Code that is to be opened, and its graphs: one has to be chosen. */
+  several: { path: string; names: string[] } | null;
   palette: PaletteAt | null;
   menu: { x: number; y: number; path: string; kind: "node" | "edge" | "canvas" } | null;
   wire: WireDrag | null;
@@ -133,6 +135,7 @@ export const useStudio = create<Studio>()(() => ({
   tab: "timeline",
   panel: null,
   popover: null,
+  several: null,
   palette: null,
   menu: null,
   wire: null,
