@@ -19,6 +19,7 @@ from hfg.studio.choosing import edge_options, gates, operators, promotions, stop
 from hfg.studio.clipboard import pasted, text_of_nodes
 from hfg.studio.following import Following
 from hfg.studio.leading_out import shown_by, ways_out
+from hfg.studio.muting import muted
 from hfg.studio.palette import search_types, type_of_reference
 from hfg.studio.places import place_at
 from hfg.studio.refusing import Refused
@@ -215,6 +216,10 @@ async def _shown_by(host: Following, args: _Path) -> Any:
     return shown_by(host.graph, args.path)
 
 
+async def _muted(host: Following, args: _Path) -> Any:
+    return muted(host.graph, args.path)
+
+
 async def _annotate(host: Following, args: Annotate) -> Any:
     return annotate(host.graph, args)
 
@@ -257,4 +262,5 @@ _ANSWERS: Final[Mapping[str, tuple[type[msgspec.Struct], Callable[[Following, An
     "annotate": (Annotate, _annotate),
     "ways_out": (_Path, _ways_out),
     "shown_by": (_Path, _shown_by),
+    "muted": (_Path, _muted),
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import base64
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,40 @@ def test_a_gate_can_be_opened_by_the_node_itself_and_all_others_and_each_row_is_
         assert [gate.by.place.path for gate in studio.graph.gates] == ["clock"]
         await page.edit(*(await page.value("gates", path="store"))["none"])
         assert list(studio.graph.gates) == []
+
+    live(main)
+
+
+def edges_of(graph: hfg.Graph) -> set[str]:
+    return {edge.label for edge in graph.edges}
+
+
+@pytest.mark.rule("F10")
+def test_what_comes_to_a_muted_node_goes_around_it_until_it_takes_part_again(tmp_path: Path) -> None:
+    async def main() -> None:
+        graph = mission()
+        graph.connect("scale.out", "spare.value", initial=[5])
+        before = edges_of(graph)
+        page = Page(studio_of(graph, tmp_path)).join()
+        await page.edit(*(await page.value("muted", path="scale"))["commands"])
+        around = {"numbers.out -> check.value", "numbers.out -> spare.value"}
+        assert edges_of(graph) == before - {"scale.out -> check.value", "scale.out -> spare.value"} | around
+        assert page.tables["nodes"]["scale"]["enabled"] is False
+        assert (await page.ask("save", path="mission.hfg.yaml"))["t"] == "ack"
+        page = Page(studio_of(again := hfg.load(tmp_path / "mission.hfg.yaml", allow=["tests"]))).join()
+        await page.edit(*(await page.value("muted", path="scale"))["commands"])
+        assert edges_of(again) == before
+        assert page.tables["edges"]["scale.out -> spare.value"]["options"] == {"initial": [5]}
+        assert page.tables["nodes"]["scale"]["notes"] == {}
+
+    live(main)
+
+
+def test_a_node_without_inputs_that_its_followers_take_cannot_be_muted_and_says_so() -> None:
+    async def main() -> None:
+        page = Page(studio_of(mission())).join()
+        refused = await page.ask("ask", what="muted", args={"path": "numbers"})
+        assert refused["message"] == 'nothing that "numbers" receives can go on in its place; disable it instead'
 
     live(main)
 

@@ -75,6 +75,20 @@ def test_a_deleted_node_comes_back_by_undo_with_its_edges(story: Story) -> None:
     story.moves_on("store")
 
 
+def test_a_muted_node_lets_its_input_go_around_it_until_it_takes_part_again(story: Story) -> None:
+    story.start()
+    before = edges_of(story)
+    story.select("scale")
+    story.press("m")
+    expect(story.node("scale")).to_have_class(re.compile(r"\bmuted-node\b"))
+    assert "numbers.out -> check.value" in edges_of(story)
+    story.moves_on("store")
+    story.press("m")
+    expect(story.node("scale")).not_to_have_class(re.compile(r"\bmuted-node\b"))
+    assert edges_of(story) == before
+    story.moves_on("store")
+
+
 def test_a_wire_from_port_to_port_lets_values_flow(story: Story) -> None:
     story.start()
     story.drag("numbers.out", "spare.value")

@@ -13,7 +13,8 @@ interface Props {
   top: number;
   missing: string;
   failed: boolean;
-  off: boolean;
+  /** Why it does nothing; "" if it may. */
+  off: "" | "disabled" | "muted";
 }
 
 const OF_ALL_INSIDE = "Bars: the busiest node inside. Then how busy all inside are together, and how often they fire.";
@@ -30,7 +31,7 @@ export function MeasureRow({ box, top, missing, failed, off }: Props) {
   const tall = helper ? 14 : 16;
 
   useEffect(() => {
-    if (missing !== "" || off) return;
+    if (missing !== "" || off !== "") return;
     let last: Measure | null = null;
     const paint = (measure: Measure, slow: boolean) => {
       last = measure;
@@ -58,10 +59,10 @@ export function MeasureRow({ box, top, missing, failed, off }: Props) {
       </div>
     );
   }
-  if (off) {
+  if (off !== "") {
     return (
       <div className="m" style={{ top }}>
-        disabled
+        {off}
       </div>
     );
   }

@@ -10,6 +10,8 @@ import { NodeTitle } from "./NodeTitle";
 import { useZoom } from "./useView";
 import { WhereLine } from "./WhereLine";
 
+const isMuted = (record: NodeRecord | undefined): boolean => record?.enabled === false && "muted" in record.notes;
+
 export type HfgNode = Node<{ box: NodeBox; plain: boolean }, "hfg">;
 
 export const isHelper = (box: NodeBox): boolean => box.height < 68;
@@ -59,6 +61,7 @@ function NodeViewPlain({ data }: NodeProps<HfgNode>) {
     look.selected && "sel",
     !look.selected && look.within && "within",
     record?.enabled === false && "off",
+    isMuted(record) && "muted-node",
     record?.missing && "missing",
     box.is_open && "open",
   ];
@@ -88,7 +91,7 @@ function NodeInside({ box, look, plain, record }: { box: NodeBox; look: Look; pl
       {box.is_open ? null : look.inside !== null ? (
         <WhereLine path={box.id} inside={look.inside} top={measure} />
       ) : (
-        !plain && <MeasureRow box={box} top={rows.measure} missing={record?.missing ?? ""} failed={look.failed} off={record?.enabled === false} />
+        !plain && <MeasureRow box={box} top={rows.measure} missing={record?.missing ?? ""} failed={look.failed} off={record?.enabled === false ? (isMuted(record) ? "muted" : "disabled") : ""} />
       )}
     </>
   );

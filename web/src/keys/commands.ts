@@ -98,6 +98,7 @@ export const DOINGS: Doing[] = [
   { name: "Delete and join the wires", keys: "Ctrl+Delete", off: edits(none), run: () => void act.dissolveNode(first()) },
   { name: "Rename", keys: "F2", off: edits(none), run: () => change({ renaming: first() }) },
   { name: "Enable or disable", keys: "E", off: edits(none), run: () => void act.toggleEnabled(act.chosen()) },
+  { name: "Mute, or let it take part again", keys: "M", off: edits(none), run: () => void act.mute(first()) },
   { name: "Make the edge active, or passive", keys: "A", off: edits(noEdge), run: () => void act.makeActive(studio().selectedEdge!) },
   { name: "Connect: choose a port, then the other", keys: "C", off: edits(none), run: () => change({ popover: "connect" }) },
   { name: "Pin a probe", keys: "P", off: noEdge, run: () => act.pin(studio().selectedEdge!) },

@@ -6,7 +6,7 @@ import { edit, enter, locked, tell } from "../state/actions";
 import { activeInside } from "../state/looking";
 import { change, useStudio } from "../state/studio";
 
-const OF_NODE = ["Rename", "Enable or disable", "Set or clear a breakpoint", "Step a firing of the selected node", "Copy as text", "Double the selection", "Make a subgraph of the selection", "Dissolve the subgraph", "Frame the selection", "Lay out the selection", "Delete", "Delete and join the wires"];
+const OF_NODE = ["Rename", "Enable or disable", "Mute, or let it take part again", "Set or clear a breakpoint", "Step a firing of the selected node", "Copy as text", "Double the selection", "Make a subgraph of the selection", "Dissolve the subgraph", "Frame the selection", "Lay out the selection", "Delete", "Delete and join the wires"];
 const OF_EDGE = ["Make the edge active, or passive", "Pin a probe", "Set or clear a breakpoint", "Delete"];
 const OF_CANVAS = ["Add a node", "Write a note", "Paste", "Lay out all", "Show all", "Go out of the subgraph"];
 

@@ -232,6 +232,12 @@ export async function toggleEnabled(paths: string[]): Promise<void> {
   await edit(paths.map((path) => ({ do: on ? "Enable" : "Disable", path })));
 }
 
+/** What comes to the node goes around it; asked for again, the node takes part again. */
+export async function mute(path: string): Promise<void> {
+  const found = await ask<{ commands: Command[] }>({ t: "ask", what: "muted", args: { path } });
+  if (found) await edit(found.commands);
+}
+
 export async function enclose(paths: string[]): Promise<void> {
   if (paths.length === 0) return;
   const { level } = studio();
