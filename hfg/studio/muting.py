@@ -1,6 +1,6 @@
 """Commands that mute a node: it is disabled, and what comes to it goes around it, until it takes part again.
 
-What went out of the node is kept in its note, so that it comes back after the graph was saved and opened, too.
+Its edges are kept in its note, so that they come back after the graph was saved and opened, too.
 """
 
 from __future__ import annotations

@@ -325,7 +325,7 @@ class RecordedProject(Project):
 
 
 def _split(path: str) -> tuple[str, str]:
-    """Return a path, and the name behind its colon, if it leads to code."""
+    """Return a path, and the name after its colon, if it leads to code."""
     place, colon, name = path.rpartition(":")
     return (place, name) if colon and place.endswith(".py") else (path, "")
 
