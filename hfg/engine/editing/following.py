@@ -16,7 +16,7 @@ from hfg.graph.structure.level import HasLevel, Level, inside, level_of
 from hfg.graph.structure.places import home_of, side_of
 from hfg.graph.structure.subgraph import is_box, iterated
 from hfg.ports import InnerSource, InnerTarget
-from hfg.ports.edges import BufferEdge
+from hfg.ports.edges import AnyEdge, BufferEdge
 
 __all__ = ["Follower", "ends_of_running", "kind_of_end"]
 
@@ -125,7 +125,7 @@ def _side_of_port(port: Any, graph: HasLevel) -> Level:
     return side_of(level)
 
 
-def ends_of_running(edge: Any) -> tuple[Any, ...]:
+def ends_of_running(edge: AnyEdge) -> tuple[Any, ...]:
     """Return what identifies an edge: nodes and names of ports; ports of the graph and observables are themselves."""
     begin = edge.source if edge.source.node is not None else edge.source_port
     end = edge.target if edge.target.node is not None else edge.target_port

@@ -20,7 +20,7 @@ from hfg.graph import Graph
 from hfg.graph.flat import Scope as FlatScope
 from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.places import node_place
-from hfg.ports.edges import EventEdge
+from hfg.ports.edges import AnyEdge, EventEdge
 
 __all__ = ["Placing", "by_index"]
 
@@ -85,11 +85,11 @@ class Placing:
             self._list_source(worker, worker.is_source)
             self.touched[worker] = None
 
-    def touch_ends(self, edge: Any) -> None:
+    def touch_ends(self, edge: AnyEdge) -> None:
         """Derive the wiring of the nodes at both ends of an edge again."""
         self.touched |= {edge.source: None, edge.target: None}
 
-    def is_refitted(self, edge: Any) -> bool:
+    def is_refitted(self, edge: AnyEdge) -> bool:
         """Return whether a node at an end of an edge was replaced."""
         return edge.source in self.refitted or edge.target in self.refitted
 
@@ -251,7 +251,7 @@ class Placing:
             self.touch_ends(edge)
             self.derive_release(edge)
 
-    def derive_release(self, edge: Any) -> None:
+    def derive_release(self, edge: AnyEdge) -> None:
         """Derive whether an edge is released in sequence, which depends on the groups at its ends (F5)."""
         if type(edge) is EventEdge:
             return
@@ -267,6 +267,6 @@ class Placing:
             release((edge,))
 
 
-def by_index(edge: Any) -> float:
+def by_index(edge: AnyEdge | Scope) -> float:
     """Return the number of an edge or scope in the order of the plan."""
     return float(edge.index)

@@ -8,7 +8,7 @@ from hfg.engine.fusion.binding import Fusible
 from hfg.engine.fusion.schedule import asks_who_hears
 from hfg.engine.fusion.tap_writing import TapWriter
 from hfg.engine.model import RunningNode
-from hfg.ports.edges import EventEdge, SyncEdge
+from hfg.ports.edges import AnyEdge, EventEdge, SyncEdge
 
 __all__ = ["Facts"]
 
@@ -69,7 +69,7 @@ class Facts:
     def _kinds(self) -> list[str]:
         return [f"t{k}" for k in range(len(self.order)) if self.single[k] and self.order[k].out_names]
 
-    def _is_pipelined(self, edge: Any) -> bool:
+    def _is_pipelined(self, edge: AnyEdge) -> bool:
         return type(edge) is SyncEdge and not edge.sequential
 
     def _heard_outputs(self, k: int) -> list[int]:

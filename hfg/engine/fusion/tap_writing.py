@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 from hfg.engine.model.tap import BatchTap, TokenTap, tap_inside
+from hfg.ports.edges import AnyEdge
 
 __all__ = ["Outs", "Passed", "TapWriter", "emit_rest"]
 
@@ -35,7 +36,7 @@ class Passed(NamedTuple):
     k: int
     number: int
     output: int
-    edge: Any
+    edge: AnyEdge
     look: BatchTap
 
 

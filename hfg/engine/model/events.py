@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Generic
 
 from hfg.engine.model.contracts import NodeT
-from hfg.ports.edges import Edge
+from hfg.ports.edges import Edge, EventEdge
 from hfg.ports.events import EventPort
 
 __all__ = ["RunningEvent", "slots_first"]
@@ -25,7 +25,7 @@ class RunningEvent(Generic[NodeT]):
     worker: NodeT
     name: str
     port: Any  # an EventPort, or None: triggers it, and has its subscribers
-    edges: tuple[Any, ...] = ()
+    edges: tuple[EventEdge, ...] = ()
     tap: tuple[Any, ...] | None = None  # who observes its signals; () if they observe only one of its edges
 
     @property
@@ -37,6 +37,6 @@ class RunningEvent(Generic[NodeT]):
         """Use this port from now on."""
         self.port = port
 
-    def feed(self, edges: Iterator[Any] | tuple[Any, ...]) -> None:
+    def feed(self, edges: Iterator[EventEdge] | tuple[EventEdge, ...]) -> None:
         """Feed these edges from now on."""
         self.edges = tuple(sorted(edges, key=slots_first))

@@ -119,7 +119,7 @@ class NodeState(Vertex[NodeT], Record):
         self.ticket += 1
         self.special = False
 
-    def took(self, edges: tuple[Any, ...], stamp: float) -> None:
+    def took(self, edges: tuple[AnyEdge, ...], stamp: float) -> None:
         """The firing has taken its tokens.
 
         Args:
@@ -196,7 +196,7 @@ class NodeState(Vertex[NodeT], Record):
         self.holds_inputs = False
         return self.taken
 
-    def release_early(self, edges: tuple[Any, ...] | None = None) -> tuple[Any, ...]:
+    def release_early(self, edges: tuple[AnyEdge, ...] | None = None) -> tuple[Any, ...]:
         """Tokens that it took from these edges, by default all, are processed before its outputs are. Return them."""
         released = self.taken if edges is None else edges
         self.taken = tuple(edge for edge in self.taken if edge not in released)
@@ -232,19 +232,19 @@ class NodeState(Vertex[NodeT], Record):
         """Only values are missing in its next firing, and a wave sees to that."""
         self.special = False
 
-    def hold(self, edges: tuple[Any, ...]) -> None:
+    def hold(self, edges: tuple[AnyEdge, ...]) -> None:
         """Some of what it has sent is not processed; these edges are released after that (F5)."""
         self.holds_inputs = True
         self.taken = edges
 
-    def wait_for_taking(self, missing: int, edges: tuple[Any, ...]) -> None:
+    def wait_for_taking(self, missing: int, edges: tuple[AnyEdge, ...]) -> None:
         """This many edges, perhaps none, hold what it has sent (F5); see `hold`."""
         self.outputs.missing = missing
         self.holds_inputs = missing > 0
         if missing:
             self.taken = edges
 
-    def resume_as_firing(self, edges: tuple[Any, ...], stamp: float) -> None:
+    def resume_as_firing(self, edges: tuple[AnyEdge, ...], stamp: float) -> None:
         """Turn a firing that a region has started into an ordinary one; what has arrived meanwhile stays."""
         self.ticket += 1
         self.counts.firings += 1
@@ -258,7 +258,7 @@ class NodeState(Vertex[NodeT], Record):
         self.call_edge = edge
         self.ticket += 1
 
-    def fire_plainly(self, edges: tuple[Any, ...], stamp: float) -> None:
+    def fire_plainly(self, edges: tuple[AnyEdge, ...], stamp: float) -> None:
         """It has had its turn, and fires with plain values: `use_turn`, `begin_firing` and `took` in one call."""
         self.queued = self.fireable = False
         self.counts.firings += 1

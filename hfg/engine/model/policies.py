@@ -12,11 +12,11 @@ import random
 from collections import deque
 from collections.abc import Callable, Iterator
 from math import inf
-from typing import Any
 
 from hfg.engine.model.groups import Policy
 from hfg.engine.model.running_node import RunningNode
 from hfg.errors import UsageError
+from hfg.ports.edges import AnyEdge
 
 __all__ = [
     "POLICIES",
@@ -91,7 +91,7 @@ class EarliestDeadline(_Ranked):
 def _oldest_stamp(node: RunningNode) -> float:
     """Return the stamp of the oldest token that it takes next."""
     if node.calls and not (node.fireable and not node.calls_before):
-        edges: tuple[Any, ...] = (node.calls[0],)
+        edges: tuple[AnyEdge, ...] = (node.calls[0],)
     else:
         edges = node.live_inputs
     return min((token.stamp for edge in edges for token in edge.contents()[:1]), default=node.core.now())

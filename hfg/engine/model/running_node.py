@@ -20,7 +20,7 @@ from hfg.engine.model.node_state import NodeState
 from hfg.engine.model.records import Ending, Record, Room
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.tasks import Tasks
-from hfg.ports.edges import Edge, EventEdge
+from hfg.ports.edges import AnyEdge, Edge, EventEdge
 from hfg.ports.events import EventPort
 
 __all__ = [
@@ -403,7 +403,7 @@ class RunningNode(NodeState["RunningNode"]):
 
     # --- who observes it ----------------------------------------------------------------------------------------------
 
-    def rewire(self, live_inputs: tuple[Any, ...]) -> None:
+    def rewire(self, live_inputs: tuple[AnyEdge, ...]) -> None:
         """Derive from the liveness of its edges what it waits for, and what it sends on."""
         self.wait_for(live_inputs)
         self.inputs.count(sum(1 for edge in live_inputs if not edge.untaken))

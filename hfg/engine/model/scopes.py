@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, Generic
+from typing import Generic
 
 from hfg.engine.model.contracts import NodeT
+from hfg.ports.edges import AnyEdge
 
 __all__ = ["Gate", "Scope"]
 
@@ -25,7 +26,7 @@ class Scope(Generic[NodeT]):
     enabled: bool = True
     members: list[NodeT] = field(default_factory=list)  # the running nodes inside, including nested ones
     children: list[Scope[NodeT]] = field(default_factory=list)  # the scopes directly inside
-    inner_edges: list[Any] = field(default_factory=list)  # those with both ends inside
+    inner_edges: list[AnyEdge] = field(default_factory=list)  # those with both ends inside
     worker: NodeT | None = None  # has its automatic ports, and never fires
     active: bool = False  # A(subgraph) as last derived
     told: bool = False  # A(subgraph) as its events have last reported it

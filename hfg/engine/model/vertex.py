@@ -362,7 +362,7 @@ class Vertex(Generic[NodeT]):
             yield from edges
         yield from self.event_edges()
 
-    def event_edges(self) -> Iterator[Any]:
+    def event_edges(self) -> Iterator[EventEdge]:
         """Yield the edges of its events."""
         for event in self.events.values():
             yield from event.edges

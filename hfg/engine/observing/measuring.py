@@ -36,6 +36,7 @@ from hfg.engine.observing.report import edge_report, node_report
 from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
 from hfg.engine.runtime.callbacks import Edited
 from hfg.engine.runtime.engine import Engine
+from hfg.ports.edges import AnyEdge
 
 __all__ = ["Measuring", "doing"]
 
@@ -195,7 +196,7 @@ class Measuring:
         self._engine.core.settle_counts()
         self._marks = {edge: edge.sent for edge in self._edges()}
 
-    def _edges(self) -> Iterator[Any]:
+    def _edges(self) -> Iterator[AnyEdge]:
         return iter(self._engine.core.edges)
 
     def spans(self) -> tuple[float, float, float]:
@@ -274,7 +275,7 @@ class Measuring:
         )
         return node, busy
 
-    def _edge(self, edge: Any, over: float) -> EdgeStatistics:
+    def _edge(self, edge: AnyEdge, over: float) -> EdgeStatistics:
         return EdgeStatistics(
             **structs.asdict(edge_report(edge)),
             rate_hz=_per_second(edge.sent - self._before.get(edge, 0), over),

@@ -28,6 +28,7 @@ from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, Port
+from hfg.ports.edges import AnyEdge
 
 __all__ = ["Looker", "Tap", "Taps", "make_tap"]
 
@@ -248,7 +249,7 @@ class Taps:
             self._looks.setdefault(place, []).append(look)
             self._install(place)
 
-    def _adopt(self, edge: Any) -> None:
+    def _adopt(self, edge: AnyEdge) -> None:
         """An edge into a slot was made while the graph runs: whoever looks at the slot looks at it too."""
         for look in self._looks.get((edge.target, edge.port_name), ()):
             self._looks.setdefault(edge, []).append(look)
@@ -300,7 +301,7 @@ class Taps:
         """An edge by which signals come from outside the graph."""
         return next((edge for edge in self._engine.core.outside.values() if edge.label == path), None)
 
-    def _edges(self) -> Iterator[Any]:
+    def _edges(self) -> Iterator[AnyEdge]:
         return iter(self._engine.core.edges)
 
     def _places(self, what: object) -> list[tuple[Any, list[Any]]]:
@@ -358,7 +359,7 @@ class Taps:
         return next(worker for worker in self._engine.core.workers if worker.node is port.node)
 
 
-def _with_same_tokens(edges: Iterable[Any]) -> list[tuple[Any, list[Any]]]:
+def _with_same_tokens(edges: Iterable[AnyEdge]) -> list[tuple[Any, list[Any]]]:
     """Each edge with those that carry the same tokens: of one output; first those that carry activity too."""
     carrying: dict[Any, list[Any]] = {}
     for edge in sorted(edges, key=lambda edge: not edge.active):
@@ -366,7 +367,7 @@ def _with_same_tokens(edges: Iterable[Any]) -> list[tuple[Any, list[Any]]]:
     return [(edge, group if len(group) > 1 else []) for group in carrying.values() for edge in group]
 
 
-def _label(edge: Any) -> str:
+def _label(edge: DrawnEdge | Ends) -> str:
     return f"{edge.source.path} -> {edge.target.path}" if isinstance(edge, Ends) else str(edge.label)
 
 

@@ -24,6 +24,7 @@ from hfg.engine.rules.ending import drain_left, drop_taken, ends_itself, gave_ba
 from hfg.engine.rules.retries import try_again
 from hfg.engine.rules.sending import put_outputs, send_automatic, send_end, trigger
 from hfg.errors import Failure, FiringTimeout, QueueLimit, UsageError
+from hfg.ports.edges import AnyEdge
 from hfg.trace import FiringEnded
 
 __all__ = ["abandon", "begin", "complete_firings", "time_out", "triggering", "write"]
@@ -38,7 +39,7 @@ def _flights(worker: RunningNode) -> ConcurrentFirings:
 
 
 def begin(
-    worker: RunningNode, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
+    worker: RunningNode, kind: str, edges: Sequence[AnyEdge], tokens: Sequence[Token[Any]], refused: Exception | None
 ) -> None:
     """A firing has taken its tokens: it continues alongside those in progress.
 
@@ -84,7 +85,7 @@ def _note_process(worker: RunningNode) -> None:
         consider(worker)
 
 
-def _begin_process(firing: ConcurrentFiring, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+def _begin_process(firing: ConcurrentFiring, edges: Sequence[AnyEdge], tokens: Sequence[Token[Any]]) -> None:
     """F4(3): the function is run."""
     worker = firing.worker
     firing.begin(

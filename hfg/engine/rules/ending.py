@@ -16,7 +16,7 @@ from hfg.engine.rules.modifiers import derive_scopes, touch
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import announce, put_outputs, send_automatic, send_end
 from hfg.errors import EndOfStream, shown
-from hfg.ports.edges import EventEdge
+from hfg.ports.edges import AnyEdge, EventEdge
 from hfg.trace import FiringEnded, TokenDrained, TokenDropped
 
 __all__ = ["drain_left", "drop_taken", "end", "end_itself", "ends_itself", "gave_back"]
@@ -35,7 +35,7 @@ def end_itself(worker: RunningNode) -> None:
     end(worker, (), ())
 
 
-def end(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+def end(worker: RunningNode, edges: Sequence[AnyEdge], tokens: Sequence[Token[Any]]) -> None:
     """F4(1): `end()` is called, what it writes leaves as one full firing, END follows (F12 begins here)."""
     core = worker.core
     drop_taken(worker, edges, tokens)
@@ -56,7 +56,7 @@ def end(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]])
     core.code.execute(worker, hook, (), lambda result, error: _ended(worker, result, error))
 
 
-def drop_taken(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+def drop_taken(worker: RunningNode, edges: Sequence[AnyEdge], tokens: Sequence[Token[Any]]) -> None:
     """F4(1): values that the ending firing has taken are dropped."""
     core = worker.core
     for edge, token in zip(edges, tokens, strict=True):
@@ -71,7 +71,7 @@ def gave_back(result: Any) -> TypeError:
     return TypeError(f"end() gave back {shown(result)}, but it writes with send(): self.out.send(...)")
 
 
-def drain_left(edges: Sequence[Any]) -> None:
+def drain_left(edges: Sequence[AnyEdge]) -> None:
     """F12: what still lies on inputs of an ended node is processed without a firing.
 
     All of it before any producer hears of that: one whose outputs are free by it may say END at once, and END is behind
@@ -91,7 +91,7 @@ def drain_left(edges: Sequence[Any]) -> None:
     for edge in drained:
         if type(edge) is EventEdge:
             freed(edge)
-    release([edge for edge in joined if type(edge) is not EventEdge and edge.unprocessed], drained=drained)
+    release([edge for edge in joined if not isinstance(edge, EventEdge) and edge.unprocessed], drained=drained)
 
 
 def _ended(worker: RunningNode, result: object, error: BaseException | None) -> None:

@@ -126,7 +126,7 @@ def fire(worker: RunningNode, *, ends: bool = False) -> None:
 
 
 def _carry_out(
-    worker: RunningNode, kind: Any, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
+    worker: RunningNode, kind: Any, edges: Sequence[AnyEdge], tokens: Sequence[Token[Any]], refused: Exception | None
 ) -> None:
     """Do what F4 has decided; `refused`: a parameter could not be set, so the firing fails (P8)."""
     core = worker.core
@@ -213,7 +213,7 @@ def _call_at_once(worker: RunningNode, values: list[Any]) -> None:
     complete_firing(worker, result)
 
 
-def _free_places(worker: RunningNode, edges: Sequence[Any]) -> None:
+def _free_places(worker: RunningNode, edges: Sequence[AnyEdge]) -> None:
     """Release the tokens taken from edges that wait for no more than that (F5 pipelined, F6)."""
     for edge in edges:
         make_room(edge)
@@ -254,7 +254,7 @@ def newest_stamp(tokens: Sequence[Token[Any]], now: float) -> float:
     return max(values or [token.stamp for token in tokens], default=now)
 
 
-def _set_parameters(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> Exception | None:
+def _set_parameters(worker: RunningNode, edges: Sequence[AnyEdge], tokens: Sequence[Token[Any]]) -> Exception | None:
     """P8: a token sets the parameter when it is taken, also in a silent firing; gives why one cannot be set."""
     for edge, token in zip(edges, tokens, strict=True):
         if edge.target_kind == "parameter" and type(token.value) is not Marker:
@@ -265,7 +265,7 @@ def _set_parameters(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[
     return None
 
 
-def arguments_of(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> list[Any]:
+def arguments_of(worker: RunningNode, edges: Sequence[AnyEdge], tokens: Sequence[Token[Any]]) -> list[Any]:
     """One argument per declared input: the value, the token if asked for, the default if absent (P6)."""
     arguments = list(worker.unset)
     for edge, token in zip(edges, tokens, strict=True):
@@ -274,7 +274,7 @@ def arguments_of(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Tok
     return arguments
 
 
-def values_of(edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> dict[str, Any]:
+def values_of(edges: Sequence[AnyEdge], tokens: Sequence[Token[Any]]) -> dict[str, Any]:
     """Return the values that were taken, by the name of the input."""
     return {
         edge.port_name: token.value
@@ -283,7 +283,7 @@ def values_of(edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> dict[str, A
     }
 
 
-def _run_process(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+def _run_process(worker: RunningNode, edges: Sequence[AnyEdge], tokens: Sequence[Token[Any]]) -> None:
     arguments = tuple(arguments_of(worker, edges, tokens))
     if worker.attempts is not None:
         worker.attempts.begin(arguments)

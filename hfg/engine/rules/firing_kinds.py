@@ -9,12 +9,13 @@ from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.engine.model.records import SAME_MOMENT_S
 from hfg.engine.model.running_node import RunningNode
 from hfg.engine.rules.wiring import rewire
+from hfg.ports.edges import AnyEdge
 from hfg.trace import FiringKind
 
 __all__ = ["kind_of"]
 
 
-def kind_of(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> FiringKind:
+def kind_of(worker: RunningNode, edges: Sequence[AnyEdge], tokens: Sequence[Token[Any]]) -> FiringKind:
     """F4: what becomes of a firing; a closed gate makes it silent (A11)."""
     for edge, token in zip(edges, tokens, strict=True):
         edge.end(token.value is END)
@@ -28,7 +29,7 @@ def kind_of(worker: RunningNode, edges: Sequence[Any], tokens: Sequence[Token[An
     return "process"
 
 
-def _lacks_values(edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> bool:
+def _lacks_values(edges: Sequence[AnyEdge], tokens: Sequence[Token[Any]]) -> bool:
     """F4(2): a mandatory input holds NO_MESSAGE, or there is none and no input holds a value."""
     absent = bool(edges)
     for edge, token in zip(edges, tokens, strict=True):

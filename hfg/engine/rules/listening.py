@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from hfg.engine.model.running_node import RunningNode
-from hfg.ports.edges import Edge, SyncEdge
+from hfg.ports.edges import AnyEdge, Edge, SyncEdge
 
 __all__ = ["Listeners", "find_listeners", "listens", "may_listen"]
 
@@ -41,7 +41,7 @@ def find_listeners(worker: RunningNode) -> None:
     worker.listeners = found if any(one is not None for one in found) else ()
 
 
-def _listeners(worker: RunningNode, edges: tuple[Any, ...]) -> Listeners | None:
+def _listeners(worker: RunningNode, edges: tuple[AnyEdge, ...]) -> Listeners | None:
     quiet = [edge for edge in edges if edge.while_active and type(edge) is SyncEdge and not edge.active]
     fast = worker.core.fast and worker.within is None
     if len(quiet) < _FEW or not fast or any(edge.tap is not None for edge in quiet):
@@ -58,7 +58,7 @@ class Listeners:
 
     __slots__ = ("_core", "_count", "_edges", "_others", "_quiet", "_seen", "awake")
 
-    def __init__(self, worker: RunningNode, edges: tuple[Any, ...], quiet: list[Any]) -> None:
+    def __init__(self, worker: RunningNode, edges: tuple[AnyEdge, ...], quiet: list[Any]) -> None:
         self._core = worker.core
         self._edges = edges
         self._quiet = quiet

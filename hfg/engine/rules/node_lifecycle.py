@@ -7,7 +7,6 @@ Each setup is followed by a teardown before the next one, whatever happens to a 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
-from typing import Any
 
 from hfg.engine.model.contracts import Timer
 from hfg.engine.model.running_node import BACKOFF, BETWEEN_FIRINGS, DISABLED, ENDED, REMOVED, TORN_DOWN, RunningNode
@@ -18,7 +17,7 @@ from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import deferring_events, send_end
 from hfg.engine.rules.sources import find_dead_sources
 from hfg.errors import NodeError
-from hfg.ports.edges import BufferEdge, Edge, EventEdge
+from hfg.ports.edges import AnyEdge, BufferEdge, Edge, EventEdge
 from hfg.trace import FiringEnded, NodeEnabled
 
 __all__ = [
@@ -255,7 +254,7 @@ def _empty(worker: RunningNode, untaken: Collection[Edge]) -> None:
             edge.go_on_working(True)
 
 
-def discard_initial(edges: Iterable[Any]) -> None:
+def discard_initial(edges: Iterable[AnyEdge]) -> None:
     """F10 for a node that is disabled from the start: discard the tokens that disabling it now would discard."""
     for edge in edges:
         if edge.target.blocked & DISABLED or (edge.source.blocked & DISABLED and type(edge) is BufferEdge):

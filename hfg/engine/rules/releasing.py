@@ -12,13 +12,13 @@ from hfg.base.token import Token
 from hfg.engine.model.running_node import RunningNode
 from hfg.engine.rules.agenda import consider, freed
 from hfg.engine.rules.sending import send_end
-from hfg.ports.edges import AnyEdge, EventEdge
+from hfg.ports.edges import AnyEdge, BufferEdge, EventEdge, SyncEdge
 from hfg.trace import TokenProcessed, TokenTaken
 
 __all__ = ["make_room", "outputs_free", "release", "take_from_reader"]
 
 
-def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
+def release(edges: Sequence[SyncEdge | BufferEdge], *, drained: Collection[Any] = ()) -> None:
     """These tokens are processed: free the producers' places where there is room now (F5, P4, P7).
 
     And transitively what waited for them, without recursion.
@@ -46,7 +46,7 @@ def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
 
 def make_room(edge: AnyEdge) -> None:
     """Its oldest token has been taken: that frees its place, unless the edge is sequential (F5, F6)."""
-    if type(edge) is EventEdge:
+    if isinstance(edge, EventEdge):
         freed(edge)
     elif not edge.sequential:
         release((edge,))

@@ -8,7 +8,7 @@ from typing import Any
 from hfg.engine.runtime import rx
 from hfg.engine.runtime.engine import Engine
 from hfg.errors import NodeError
-from hfg.ports.edges import EventEdge
+from hfg.ports.edges import AnyEdge, EventEdge
 
 __all__ = ["EdgeStreams"]
 
@@ -49,7 +49,7 @@ class EdgeStreams:
 
         self._disposables[edge] = stop
 
-    def forget(self, edge: Any) -> None:
+    def forget(self, edge: AnyEdge) -> None:
         """An edit has removed this edge (R4)."""
         dispose = self._disposables.pop(edge, None)
         if dispose is not None:

@@ -17,6 +17,7 @@ from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
 from hfg.nodetypes.node import Node
 from hfg.ports import Port
+from hfg.ports.edges import AnyEdge
 
 if TYPE_CHECKING:
     from hfg.engine.runtime.engine import Engine
@@ -55,7 +56,7 @@ def place_of(engine: Engine, what: Any) -> Any:
         raise GraphError(f'there is no edge "{what}" in this run; {suggest(what, labels)}') from None
 
 
-def edges_at(engine: Engine, place: Any) -> list[Any]:
+def edges_at(engine: Engine, place: Any) -> list[AnyEdge]:
     """Return the edges of the run, between nodes, at a place."""
     if isinstance(place, Ends):
         return [
@@ -64,7 +65,7 @@ def edges_at(engine: Engine, place: Any) -> list[Any]:
     return [edge for edge in _edges(engine) if relays.is_at(edge.segments, place)]
 
 
-def _edges(engine: Engine) -> Iterator[Any]:
+def _edges(engine: Engine) -> Iterator[AnyEdge]:
     return (edge for edge in engine.core.edges if edge.segments)
 
 

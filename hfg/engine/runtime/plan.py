@@ -12,7 +12,7 @@ from hfg.errors import GraphError, UsageError
 from hfg.graph.flat import LINK, End, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.graph.flat import Scope as FlatScope
 from hfg.graph.structure.places import edge_place, home_of, node_place
-from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
+from hfg.ports.edges import AnyEdge, BufferEdge, EventEdge, SyncEdge
 
 __all__ = [
     "Ends",
@@ -173,7 +173,7 @@ class Ends:
             return owner
         return self.at_border(end, self._around)
 
-    def join(self, edge: Any, flat: FlatEdge) -> None:
+    def join(self, edge: AnyEdge, flat: FlatEdge) -> None:
         """Connect an edge to its ends; an end in another part is represented by an outlet or inlet (L1)."""
         if flat.target.node == LINK:
             source = self.of(flat.source)
@@ -248,7 +248,7 @@ def make_worker(core: Core, flat_node: FlatNode, groups: Mapping[str, Group]) ->
 
 def make_edge(core: Core, flat: FlatEdge, ends: Ends) -> Any:
     """Make a running edge; it is not wired yet."""
-    edge: Any
+    edge: AnyEdge
     options = flat.options
     if flat.is_event_edge:
         edge = EventEdge(
@@ -270,12 +270,12 @@ def make_edge(core: Core, flat: FlatEdge, ends: Ends) -> Any:
     return edge
 
 
-def describe(edge: Any, flat: FlatEdge, ends: Ends) -> None:
+def describe(edge: AnyEdge, flat: FlatEdge, ends: Ends) -> None:
     """Note what a running edge stands for in the drawn graph."""
     edge.stand_for(flat.segments, flat.source.port, flat.target.port, ends.scopes_of(flat), flat.options)
 
 
-def wire(edge: Any, flat: FlatEdge) -> None:
+def wire(edge: AnyEdge, flat: FlatEdge) -> None:
     """Connect an edge to its source and target, in its place in the order."""
     source: RunningNode = edge.source
     target: RunningNode = edge.target
@@ -283,12 +283,13 @@ def wire(edge: Any, flat: FlatEdge) -> None:
     if flat.source.kind == "event":
         named = source.node is not None or flat.source.name == "start"
         event = source.make_event(flat.source.name, flat.source.port if named else None)
+        assert isinstance(edge, EventEdge)
         event.feed((*event.edges, edge))
     elif flat.source.kind != "observable":
         source.lead_out(edge, flat.source.kind, flat.source.name)
 
 
-def unwire(edge: Any) -> None:
+def unwire(edge: AnyEdge) -> None:
     """Disconnect an edge from its source and target; its tokens stay on it."""
     edge.target.lose_incoming(edge)
     edge.source.lose_outgoing(edge)
@@ -299,14 +300,14 @@ def _not_piped_yet(token: Any) -> None:
     raise UsageError("an event with operators on its edge was triggered in setup(): trigger it in a firing or a slot")
 
 
-def derive_release(edge: Any) -> None:
+def derive_release(edge: AnyEdge) -> None:
     """Derive when a token on an edge is processed, and whether the node that it enables goes next (F5, R2)."""
     if type(edge) is not EventEdge:
         sequential = _is_sequential(edge)
         edge.be_released(sequential=sequential, depth_first=sequential and _stays(edge))
 
 
-def _is_sequential(edge: Any) -> bool:
+def _is_sequential(edge: AnyEdge) -> bool:
     """Return the consumer's mode: `auto` is sequential within a group (F5). A delay ends the wave in any mode (P7)."""
     target: RunningNode = edge.target
     release = target.options.release if target.options is not None and target.concurrent is None else "pipelined"  # F14
@@ -317,7 +318,7 @@ def _is_sequential(edge: Any) -> bool:
     return bool(release == "sequential")
 
 
-def _stays(edge: Any) -> bool:
+def _stays(edge: AnyEdge) -> bool:
     """Return whether the edge stays in a depth-first group; tokens from outside are a wave of their own (R2)."""
     source: RunningNode = edge.source
     target: RunningNode = edge.target
