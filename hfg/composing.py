@@ -96,7 +96,23 @@ def _add_checks() -> None:
     import hfg.activity.analysis  # noqa: F401
 
 
+def _watch_facts(run: Any) -> None:
+    """Implement `hooks.watch_facts`."""
+    from hfg.monitors.facts import watch_facts
+
+    watch_facts(run)
+
+
+def _states(graph: Any) -> Any:
+    """Implement `hooks.states`."""
+    from hfg.analysis import analyse_activity
+
+    return analyse_activity(graph).diagram().graph()
+
+
 hooks.add_checks = _add_checks
+hooks.states = _states
+hooks.watch_facts = _watch_facts
 hooks.refusal = _refusal
 hooks.distribute = _distribute
 hooks.studio = _studio

@@ -2,10 +2,13 @@
 
 reading    what the code of a node type may send         game       activity as a token game
 searching  its states, and which places go together      proving    proofs and counter-examples
+reach      what activity reaches, region by region       findings   what is probably a mistake
+diagram    the states, and what leads where              wording    a report in words
 report     the analysis of activity, for users
 """
 
-from hfg.analysis.proving import Step, Verdict
-from hfg.analysis.report import ActivityReport, Region, analyse_activity
+from hfg.analysis.diagram import StateDiagram
+from hfg.analysis.proving import Region, Step, Verdict
+from hfg.analysis.report import ActivityReport, analyse_activity
 
-__all__ = ["ActivityReport", "Region", "Step", "Verdict", "analyse_activity"]
+__all__ = ["ActivityReport", "Region", "StateDiagram", "Step", "Verdict", "analyse_activity"]

@@ -7,17 +7,15 @@ Depends on `game` and `searching`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
 
 from hfg.analysis.game import Game, Kind, Play
 from hfg.analysis.searching import Searched, pairs_together
 from hfg.graph.flat import ROOT
+from hfg.graph.structure.facts import Claim
 
-__all__ = ["Claim", "Step", "Verdict", "regions_of", "steps_to", "verdict"]
-
-Claim: TypeAlias = Literal["at most one", "exactly one"]
+__all__ = ["Region", "StatedFact", "Step", "Verdict", "regions_of", "steps_to", "verdict"]
 
 
 @dataclass(frozen=True)
@@ -55,6 +53,7 @@ class Verdict:
       states: how many states were looked at.
       steps: the counter-example, from the start of the run. Without steps, the start itself breaks the claim.
       why: why it is not decided, and what to do.
+      given: the stated facts on which a proof depends, in words.
     """
 
     claim: Claim
@@ -64,12 +63,57 @@ class Verdict:
     states: int = 0
     steps: tuple[Step, ...] = ()
     why: str = ""
+    given: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         nodes = f"{len(self.nodes)} nodes" if len(self.nodes) > 3 else ", ".join(f'"{path}"' for path in self.nodes)
         result = {True: f"proved by {self.method}", False: f"broken in {len(self.steps)} steps", None: "not proved"}
         why = f": {self.why}" if self.why else ""
-        return f"{self.claim} of {nodes} is active: {result[self.holds]}{why}"
+        return f"{self.claim} of {nodes} is active: {result[self.holds]}{self.given_that()}{why}"
+
+    def given_that(self) -> str:
+        """Name the facts on which the proof depends, as the end of a sentence; "" if there are none."""
+        return f", given that {' and that '.join(self.given)}" if self.given else ""
+
+
+@dataclass(frozen=True)
+class StatedFact:
+    """A fact that the graph states, and what the analysis knows of it.
+
+    Attributes:
+      fact: in words.
+      path: the first of its nodes.
+      verdict: whether it follows from edges and code without being stated; None where the analysis does not go.
+      is_read: a counter-example takes no step of code that could not be read.
+    """
+
+    fact: str
+    path: str
+    verdict: Verdict | None
+    is_read: bool
+
+
+@dataclass(frozen=True)
+class Region:
+    """Nodes between which activity moves.
+
+    Attributes:
+      nodes: their paths.
+      begins: how many of them the start of the run activates.
+      at_most_one: whether it is proved that at most one is active.
+      exactly_one: the same for exactly one.
+      states: how many states were reached.
+      is_complete: these are all.
+      unproved: what is not known because there are more, in words; "" if they are all.
+    """
+
+    nodes: tuple[str, ...]
+    begins: int
+    at_most_one: Verdict
+    exactly_one: Verdict
+    states: int
+    is_complete: bool
+    unproved: str
 
 
 def regions_of(game: Game) -> list[list[int]]:
@@ -94,7 +138,7 @@ def regions_of(game: Game) -> list[list[int]]:
     return list(found.values())
 
 
-def verdict(play: Play, found: Searched, nodes: Iterable[int], claim: Claim) -> Verdict:
+def verdict(play: Play, found: Searched, nodes: Iterable[int], claim: Claim, facts: Sequence[str] = ()) -> Verdict:
     """Decide a claim about nodes that take part in a play.
 
     A node counts if it is active, and so does each activity in transit to one of them.
@@ -104,6 +148,7 @@ def verdict(play: Play, found: Searched, nodes: Iterable[int], claim: Claim) -> 
       found: its states, or the first ones.
       nodes: whose activity is counted.
       claim: how many of them there are.
+      facts: the premises of the search, in words, by number.
     """
     game = play.game
     nodes = sorted(nodes)
@@ -122,7 +167,8 @@ def verdict(play: Play, found: Searched, nodes: Iterable[int], claim: Claim) -> 
         if not least <= (state & mask).bit_count() <= 1:
             return Verdict(claim, paths, False, "search", number, tuple(steps_to(game, found, state)))
     if found.is_complete:
-        return Verdict(claim, paths, True, "search", states)
+        given = tuple(facts[number] for number in sorted(found.left_out))
+        return Verdict(claim, paths, True, "search", states, given=given)
     why = (
         f"the search ended at its limit of {states} states, and none of them breaks it; a larger limit looks further "
         "(max_states=, --states)"

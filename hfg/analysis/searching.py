@@ -6,11 +6,32 @@ concurrency relation (Kovalyov 1992) is polynomial, and finds at least every pai
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, field
 
 from hfg.analysis.game import Play, Rule, singles
 
-__all__ = ["Searched", "pairs_together", "search"]
+__all__ = ["Premise", "Searched", "pairs_together", "search"]
+
+
+@dataclass(frozen=True)
+class Premise:
+    """A fact that is taken for granted.
+
+    Attributes:
+      number: which one.
+      mask: the places that count.
+      exactly: never none of them, once there is one.
+    """
+
+    number: int
+    mask: int
+    exactly: bool
+
+    def excludes(self, before: int, after: int) -> bool:
+        """Whether a step cannot be, because it would violate the fact."""
+        count = (after & self.mask).bit_count()
+        return count > 1 or (count == 0 and self.exactly and bool(before & self.mask))
 
 
 @dataclass
@@ -19,11 +40,13 @@ class Searched:
 
     Attributes:
       reached: in the order in which they were found.
-      is_complete: nothing was left out.
+      is_complete: all were found.
+      left_out: the numbers of the premises without which there would be more.
     """
 
     reached: dict[int, tuple[int, Rule] | None]
     is_complete: bool
+    left_out: set[int] = field(default_factory=set)
 
     def way_to(self, state: int) -> list[tuple[Rule, int]]:
         """Return the steps from the start to a state, and the state after each."""
@@ -36,18 +59,29 @@ class Searched:
         return way[::-1]
 
 
-def search(play: Play, limit: int) -> Searched:
-    """Search breadth first, until nothing is left, or there are more states than the limit."""
+def search(play: Play, limit: int, premises: Collection[Premise] = ()) -> Searched:
+    """Search breadth first, until nothing is left, or there are more states than the limit.
+
+    Args:
+      play: the game.
+      limit: how many states are looked at.
+      premises: steps that would violate one of them are left out.
+    """
     reached: dict[int, tuple[int, Rule] | None] = {play.first: None}
+    left_out: set[int] = set()
     waiting = [play.first]
     for state in waiting:
         for rule, after in play.steps_from(state):
             if after not in reached:
+                excluding = [one.number for one in premises if one.excludes(state, after)] if premises else None
+                if excluding:
+                    left_out.update(excluding)
+                    continue
                 if len(reached) >= limit:
-                    return Searched(reached, False)
+                    return Searched(reached, False, left_out)
                 reached[after] = (state, rule)
                 waiting.append(after)
-    return Searched(reached, True)
+    return Searched(reached, True, left_out)
 
 
 def pairs_together(play: Play) -> dict[int, int]:

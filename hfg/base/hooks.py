@@ -20,6 +20,8 @@ class _Hooks:
       visit_studio: `hfg.studio.local.visit`, for other programs of the same user that steer a run.
       refusal: why a graph file may not name these references of node types and operators, references in values, or
         types, given which packages are allowed in addition; None if it may.
+      watch_facts: `hfg.monitors.facts.watch_facts`, which lets a debug run check the facts of its graph.
+      states: the state diagram of a graph, as a graph that is drawn.
       add_checks: adds the checks of graphs that upper layers have, once.
     """
 
@@ -29,6 +31,8 @@ class _Hooks:
     studio: Callable[..., Any]
     visit_studio: Callable[..., Any]
     refusal: Callable[[Iterable[str], Iterable[str], Iterable[str], Iterable[str]], str | None]
+    states: Callable[[Any], Any]
+    watch_facts: Callable[[Any], None]
     add_checks: Callable[[], None]
 
 

@@ -30,8 +30,11 @@ def draw(
         Literal["used", "all"], typer.Option(help="Ports to show in an SVG: those with edges, or all.")
     ] = "used",
     view: Annotated[
-        Literal["activity", "mission", "all"] | None,
-        typer.Option(help="An SVG shows states and what feeds them, all with bundles, or each edge by itself."),
+        Literal["states", "activity", "mission", "all"] | None,
+        typer.Option(
+            help="Only the states that can be reached; or, of an SVG: states and what feeds them, all with bundles, or "
+            "each edge by itself."
+        ),
     ] = None,
     format: Annotated[  # noqa: A002 - the word users know
         Literal["svg", "mmd", "dot"] | None,

@@ -95,6 +95,8 @@ def graph_path(key: Key, edges: Any = None) -> str:
             return path
         case ["parameters" | "inputs" | "outputs" | "events" | "slots" | "promotes", str() as name, *_]:
             return f"{path}.{name}" if path else name
+        case ["facts", int() as number, *_]:
+            return f"facts[{number}]"
         case ["groups", str() as name, *_]:
             return f'group "{name}"'
         case [name, *_]:

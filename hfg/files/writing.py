@@ -33,7 +33,10 @@ def text_of(document: Document) -> str:
         value = getattr(document, name)
         if value:
             said[name] = _plain(value)
-    return emit(said | _box(document))
+    said |= _box(document)
+    if document.facts:
+        said["facts"] = _plain(document.facts)
+    return emit(said)
 
 
 def _box(box: BoxDocument) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Final, Literal, Never, TypeAlias, TypeVar, Unp
 from reactivex import Observable
 from typing_extensions import TypeForm
 
+from hfg.base.hooks import hooks
 from hfg.base.token import Token
 from hfg.errors import Problem, UsageError
 from hfg.graph.checks.checking import check
@@ -27,6 +28,7 @@ from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.connecting import connect
 from hfg.graph.structure.declaring import declare_group, move, need_new_port, promote, set_gate
 from hfg.graph.structure.edge import Edge
+from hfg.graph.structure.facts import Fact, facts_of, state_fact
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level, Whole, inside
 from hfg.graph.structure.naming import need_name
@@ -98,6 +100,11 @@ class Graph:
     def gates(self) -> list[Gate]:
         """The gates, in the order in which they were declared."""
         return self._level.gates.listed
+
+    @property
+    def facts(self) -> list[Fact]:
+        """The facts that were stated about the activity of nodes in here."""
+        return facts_of(self._level)
 
     @property
     def groups(self) -> dict[str, GroupSpec]:
@@ -244,6 +251,32 @@ class Graph:
             )
         return set_gate(self._level, target, by, idle_rate_hz)
 
+    # --- facts ---
+
+    def at_most_one(self, *nodes: Node | str) -> Fact:
+        """State that never more than one of some nodes is active.
+
+        The analysis of activity takes it for granted where it can neither prove nor read it, and says so. Debug runs
+        and the test kit check it: a run that violates it fails. Activity in transit to one of the nodes counts, too.
+
+        Args:
+          *nodes: nodes of this graph or of a subgraph in it, or their paths. A subgraph stands for all nodes inside.
+
+        Returns:
+          The fact.
+
+        Raises:
+          GraphError: there are fewer than two, or one is not in this graph; nothing was changed.
+        """
+        return state_fact(self._level, "at most one", nodes)
+
+    def exactly_one(self, *nodes: Node | str) -> Fact:
+        """State that exactly one of some nodes is active, from when activity first comes to one of them.
+
+        Otherwise like `at_most_one`.
+        """
+        return state_fact(self._level, "exactly one", nodes)
+
     # --- ports of the whole ---
 
     def input(self, name: str, type: TypeForm[T]) -> GraphInput[T]:  # noqa: A002 - the word users know
@@ -321,7 +354,7 @@ class Graph:
         fold: Iterable[Node | str] = (),
         active: Iterable[Node | str] | None = None,
         ports: Literal["used", "all"] = "used",
-        view: Literal["activity", "mission", "all"] | None = None,
+        view: Literal["states", "activity", "mission", "all"] | None = None,
         format: Literal["svg", "mmd", "dot"] | None = None,  # noqa: A002 - the word users know
     ) -> str:
         """Draw the graph and return the drawing as text. Notebooks show a graph without this.
@@ -338,8 +371,9 @@ class Graph:
           active: the nodes and subgraphs to show as active, as `run.active()` returns them. Default: those that are
             active now.
           ports: "all" also shows ports without an edge.
-          view: of an SVG, "activity" shows the states and what feeds them, "mission" all edges with data in bundles,
-            "all" each edge by itself. Default: "mission" if activity moves between nodes, else "all".
+          view: "states" shows only the states that can be reached and the events that lead from one to another, in any
+            format. Of an SVG, "activity" shows the states and what feeds them, "mission" all edges with data in
+            bundles, "all" each edge by itself. Default: "mission" if activity moves between nodes, else "all".
           format: "svg", "mmd" or "dot", regardless of the file's name. Default without a file: Mermaid.
 
         Returns:
@@ -350,6 +384,11 @@ class Graph:
           UsageError: the file's name has another ending, the file cannot be written, or an argument is invalid.
         """
         from hfg.graph.drawing.formats import draw, view_of  # here, for most programs draw nothing
+
+        if view == "states":
+            paths = [list(map(_path_of, nodes)) for nodes in (fold, active or ())]
+            drawn: Graph = hooks.states(self)
+            return drawn.draw(path, depth=depth, fold=paths[0], active=paths[1], view="activity", format=format)
 
         return draw(self, path, format=format, view=view_of(self, depth, fold, active, ports, view))
 
@@ -475,6 +514,10 @@ class Graph:
     def _run(self) -> object | None:
         """The run that it has as a whole, if any; asked by events."""
         return self._level.whole.run
+
+
+def _path_of(node: Node | str) -> str:
+    return node if isinstance(node, str) else node.place.path
 
 
 def _need_known(kind: type[Fields[Any]], options: Iterable[str], call: str) -> None:

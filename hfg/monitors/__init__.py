@@ -4,6 +4,7 @@ formulas     what is true at a point: activity, values, firings, and what was tr
 compiling    a formula as one function
 properties   patterns over formulas, and what judges them
 watching     lets them be judged in a run
+facts        the facts that are stated in the graph, in debug runs
 
 Examples:
   >>> from hfg import monitors as m

@@ -60,6 +60,9 @@ def _said(command: c.Command) -> str:
             return _noted(path, name, removed=command.value is None)
         case c.Promote(path=path, inner=inner, promoted=promoted):
             return f"let {path} stand for {inner}" if promoted else f"let {path} no longer stand for {inner}"
+        case c.Fact(claim=claim, nodes=nodes, stated=stated):
+            some = ", ".join(nodes[:_MOST_COMMANDS])
+            return f"{'state' if stated else 'no longer state'} that {claim} of {some} is active"
         case c.MakeActive(source=source, target=target, active=active):
             return f"make {source} → {target} {'active' if active else 'inactive'}"
     words = _WORDS.get(type(command))

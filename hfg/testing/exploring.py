@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import hfg
-from hfg.errors import RunError, UsageError, in_words
+from hfg.errors import MonitorViolated, RunError, UsageError, in_words
 from hfg.graph import Graph
 from hfg.testing.conformance import Divergence, describe, replay
 from hfg.testing.invariants import Invariant, broken, of_graph
@@ -220,12 +220,14 @@ def _try(
 ) -> _Tried:
     trace = Recorder()
     outcome, failed = "failed", ""
+    wrong: list[str] = []
     options: dict[str, Any] = {"policy": "random", "seed": seed, "until_s": until_s, "trace": trace, "debug": debug}
     try:
         outcome = hfg.run(build(), clock="virtual", **options).outcome
     except RunError as error:
         outcome, failed = trace.outcome or type(error).__name__, str(error)
-    wrong = broken(trace, checks)
+        wrong = [failed] if isinstance(error, MonitorViolated) else []
+    wrong += broken(trace, checks)
     if conform and not wrong:
         try:
             replay(build, trace, until_s=until_s)

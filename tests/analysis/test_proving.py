@@ -7,6 +7,7 @@ import pytest
 
 import hfg
 from examples.fetch_delivery.mission import build
+from hfg import commands
 from hfg.analysis.game import Game, Play
 from hfg.analysis.proving import regions_of, verdict
 from hfg.analysis.searching import pairs_together, search
@@ -275,3 +276,83 @@ def test_the_search_agrees_with_counting_about_the_mission() -> None:
 def test_a_report_is_plain_data() -> None:
     data = hfg.analyse_activity(ring(Both)).as_data()
     assert msgspec.json.decode(msgspec.json.encode(data)) == data
+
+
+# --- facts that are stated
+
+
+class Hidden(hfg.Node):
+    """Its code cannot be read."""
+
+    a, b = hfg.Event(), hfg.Event()
+
+    @hfg.slot
+    def take(self) -> None:
+        """Receive activity."""
+
+    @hfg.slot
+    def send(self, name: str) -> None:
+        getattr(self, name).trigger()
+
+
+class Open(Hidden):
+    """Its code can be read, and two conditions that exclude each other look as if they did not."""
+
+    @hfg.slot
+    def send(self, name: str) -> None:
+        if name == "a":
+            self.a.trigger()
+        if name != "a":
+            self.b.trigger()
+
+
+def three(kind: type[Hidden], *facts: str) -> hfg.Graph:
+    graph = hfg.Graph("three")
+    one, two, last = graph.add(kind(), name="one"), graph.add(kind(), name="two"), graph.add(kind(), name="last")
+    graph.start.activates(one.take)
+    one.a.activates(two.take)
+    one.b.activates(last.take)
+    two.a.activates(one.take)
+    last.a.activates(one.take)
+    for fact in facts:
+        getattr(graph, fact)("one", "two", "last")
+    return graph
+
+
+def test_a_fact_is_a_premise_where_code_cannot_be_read_and_the_proof_says_so() -> None:
+    assert hfg.analyse_activity(three(Hidden)).at_most_one("two", "last").holds is False
+    report = hfg.analyse_activity(three(Hidden, "at_most_one"))
+    found = report.at_most_one("two", "last")
+    assert found.holds
+    assert found.given == ('at most one of "one", "two", "last" is active',)
+    assert not [one for one in report.problems if one.check == "fact-in-doubt"]
+    assert "taken for granted" in str(report)
+
+
+def test_a_fact_that_code_which_was_read_seems_to_violate_is_in_doubt() -> None:
+    report = hfg.analyse_activity(three(Open, "at_most_one"))
+    assert report.at_most_one("two", "last").holds
+    assert [one.path for one in report.problems if one.check == "fact-in-doubt"] == ["one"]
+    fact = report.facts[0]
+    assert fact.verdict is not None
+    assert fact.verdict.holds is False
+
+
+def test_a_fact_that_follows_anyway_is_no_premise() -> None:
+    graph = three(Hidden)
+    graph.edit(*(commands.MakeActive(*edge, False) for edge in (("one.b", "last.take"), ("last.a", "one.take"))))
+    graph.exactly_one("one", "two")
+    report = hfg.analyse_activity(graph)
+    assert report.facts[0].verdict is not None
+    assert report.facts[0].verdict.given == ()
+
+
+def test_exactly_one_as_a_premise_excludes_that_activity_is_lost() -> None:
+    graph = three(Hidden)
+    graph.connect("one.a", "two.deactivate")
+    graph["two.take"]  # is entered, and may be deactivated at any moment
+    assert hfg.analyse_activity(graph).exactly_one("one", "two", "last").holds is False
+    graph.exactly_one("one", "two", "last")
+    found = hfg.analyse_activity(graph).exactly_one("one", "two", "last")
+    assert found.holds
+    assert found.given

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import hfg
-from hfg.analysis import game, report
+from hfg.analysis import game, reach
 from hfg.errors import GraphError
 from hfg.nodes.activity import Wait
 
@@ -25,10 +25,10 @@ def parts(number: int) -> hfg.Graph:
 
 
 def test_all_parts_together_have_one_share_of_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(report, "_BYTES_PER_STATE", 1000)
+    monkeypatch.setattr(reach, "_BYTES_PER_STATE", 1000)
     found = hfg.analyse_activity(parts(20), max_states=100)
     assert found.regions[0].states == 100
-    assert sum(one.states for one in found.regions) * report._STATE_BYTES <= 100 * 1000 + 20 * report._STATE_BYTES
+    assert sum(one.states for one in found.regions) * reach._STATE_BYTES <= 100 * 1000 + 20 * reach._STATE_BYTES
     assert found.may_be_active("wait_19_2"), "what was not looked at counts as possible"
     assert found.regions[-1].at_most_one.holds is None
 

@@ -15,6 +15,7 @@ from typing_extensions import override
 
 from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.edge import Edge
+from hfg.graph.structure.facts import Fact, swap_in_facts
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.groups import Groups, GroupsState
 from hfg.graph.structure.level import Level, inside, level_of
@@ -107,6 +108,7 @@ class NodeSwap(Change):
         level.members.swap(where.name, self.new)
         leave(self.old)
         settle(self.new, level, where.name, options)
+        swap_in_facts(level.whole.facts, self.old, self.new)
 
 
 @dataclass(eq=False)
@@ -207,6 +209,36 @@ class GateChange(Change):
             self.level.gates.insert(self.position, self.gate)
         else:
             self.level.gates.remove(self.position)
+
+
+@dataclass(eq=False)
+class FactChange(Change):
+    """A fact is stated or taken back."""
+
+    facts: list[Fact]
+    fact: Fact
+    position: int
+    added: bool
+
+    @override
+    def do(self) -> None:
+        if self.added:
+            self.facts.insert(self.position, self.fact)
+        else:
+            del self.facts[self.position]
+
+
+@dataclass(eq=False)
+class FactsMoved(Change):
+    """The facts about a node are about another."""
+
+    facts: list[Fact]
+    old: Node
+    new: Node
+
+    @override
+    def do(self) -> None:
+        swap_in_facts(self.facts, self.old, self.new)
 
 
 @dataclass(eq=False)

@@ -13,6 +13,7 @@ import msgspec
 from typing_extensions import override
 
 from hfg.graph.editing.command import Command, decode, encode, read
+from hfg.graph.structure.facts import Claim
 from hfg.graph.structure.option import add_unset
 from hfg.graph.structure.options import EdgeFields, EdgeGiven, GroupFields, GroupGiven, NodeGiven
 
@@ -32,6 +33,7 @@ __all__ = [
     "EdgeSaid",
     "Enable",
     "Enclose",
+    "Fact",
     "Gate",
     "MakeActive",
     "Move",
@@ -268,6 +270,14 @@ class Ungate(Command, frozen=True):
     """Take the gate of a node or subgraph away."""
 
     path: str
+
+
+class Fact(Command, frozen=True):
+    """State how many of some nodes are active, as `graph.at_most_one` and `graph.exactly_one` do, or no more."""
+
+    claim: Claim
+    nodes: tuple[str, ...]
+    stated: bool = True
 
 
 class Promote(Command, frozen=True):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, TypeVar, cast
 
 from hfg.graph.structure.edge import Edge
+from hfg.graph.structure.facts import Fact
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level, inside
 from hfg.graph.structure.membership import leave, open_box, set_options
@@ -41,6 +42,8 @@ def copy_of(node: Node, around: Level) -> tuple[Node, Level | None]:
         open_box(box, new_level)
     for old_level, new_level in levels:
         _connect(old_level, new_level, copies)
+    new_facts = [fact for fact in around.whole.facts if all(node in copies for node in fact.nodes)]
+    around.whole.facts += [Fact(fact.claim, tuple(copies[node] for node in fact.nodes)) for fact in new_facts]
     leave(first)
     return first, levels[0][1] if levels else None
 

@@ -59,6 +59,8 @@ def _key(command: c.Command) -> tuple[Any, ...]:
             return "node", path
         case c.Enable(path=path) | c.Disable(path=path):
             return "enabled", path
+        case c.Fact(claim=claim, nodes=nodes):
+            return "fact", f"{claim}: {sorted(nodes)}"
         case c.AddGroup(name=name) | c.AddInput(name=name) | c.AddOutput(name=name):
             return type(command).__name__, name
     return type(command).__name__, getattr(command, "path", "")
@@ -73,6 +75,8 @@ def _about(command: c.Command) -> Iterator[str]:
             yield from (_node_of(path), _node_of(inner))
         case c.Gate(path=path, by=by):
             yield from (path, by)
+        case c.Fact(nodes=nodes):
+            yield from nodes
         case c.SetParameter(path=path):
             yield _node_of(path)
         case c.Note(path=""):
@@ -139,6 +143,8 @@ class _Difference:
                     yield c.Disconnect(old.source, old.target)
                 case c.Gate() if not same(old, new):
                     yield c.Ungate(old.path)
+                case c.Fact() if new is None:
+                    yield c.Fact(old.claim, old.nodes, stated=False)
                 case c.Promote() if new is None:
                     yield c.Promote(old.path, old.inner, promoted=False)
                 case c.AddInput() | c.AddOutput() if new is None:

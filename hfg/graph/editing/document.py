@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Final, Unpack
 import msgspec
 
 from hfg.graph.editing.commands import EdgeSaid, Operator
+from hfg.graph.structure.facts import Claim
 from hfg.graph.structure.option import declared
 from hfg.graph.structure.options import EdgeGiven, GroupFields, NodeFields
 
@@ -57,6 +58,18 @@ class GateDocument(msgspec.Struct, omit_defaults=True):
 
     by: str
     idle_rate_hz: float | None = None
+
+
+class FactDocument(msgspec.Struct):
+    """How many of some nodes are active at any moment.
+
+    Attributes:
+      claim: "at most one" or "exactly one".
+      nodes: the paths of nodes and subgraphs.
+    """
+
+    claim: Claim
+    nodes: list[str]
 
 
 class GroupDocument(GroupFields, omit_defaults=True, kw_only=True):
@@ -177,12 +190,14 @@ class Document(BoxDocument, omit_defaults=True):
       name: of the graph, for people.
       notes: about the whole, by name.
       groups: where nodes run, by name.
+      facts: what is stated about activity.
     """
 
     hfg: int = VERSION
     name: str = "graph"
     notes: dict[str, Any] = {}
     groups: dict[str, GroupDocument] = {}
+    facts: list[FactDocument] = []
 
 
 NODE_OPTIONS: Final = tuple(declared(NodeFields))

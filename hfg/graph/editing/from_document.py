@@ -24,6 +24,7 @@ from hfg.graph.editing.document import (
 from hfg.graph.editing.making import made
 from hfg.graph.editing.steps import Steps
 from hfg.graph.structure.edge import PortEnd, end_path
+from hfg.graph.structure.facts import Fact
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level, inside
 from hfg.graph.structure.naming import suggest
@@ -110,6 +111,8 @@ class Builder:
                 self._promote(part, lost)
             for part, lost in zip(parts, missing, strict=True):
                 self._gate(part, lost)
+            if isinstance(document, Document):
+                self._state(document, missing[0])
             for part in parts:
                 self._differ(part)
 
@@ -282,6 +285,15 @@ class Builder:
             for path, said in node.inside.items() if self.may_differ(part.level.nodes[name]) else ():
                 if said.gate is not None:
                     self._set_gate(part.level, f"{name}/{path}", said.gate, (*key, "inside", path, "gate"), lost)
+
+    def _state(self, document: Document, lost: Set[str]) -> None:
+        for number, said in enumerate(document.facts):
+            if any(path.partition("/")[0] in lost for path in said.nodes):
+                continue
+            with self.refusing(("facts", number)):
+                fact = Fact(said.claim, tuple(node_at(self.root, path) for path in said.nodes))
+                self.steps.state(fact)
+                self.record(c.Fact(said.claim, tuple(said.nodes)))
 
     def _set_gate(self, level: Level, path: str, said: GateDocument, key: Key, lost: Set[str]) -> None:
         by, seen = (said.by[1:], self.root) if said.by.startswith("/") else (said.by, level)

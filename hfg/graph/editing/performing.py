@@ -22,6 +22,7 @@ from hfg.graph.editing.replacing import replace
 from hfg.graph.editing.steps import Steps
 from hfg.graph.structure.connecting import refuse
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd
+from hfg.graph.structure.facts import Fact
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level, level_of, nodes_within
 from hfg.graph.structure.naming import need_name, suggest
@@ -209,7 +210,11 @@ class _Interpreter:
             f'there is no edge "{command.source}" -> "{command.target}"; graph.edges lists those that there are'
         )
 
-    # --- gates and promotions ---
+    # --- facts, gates and promotions ---
+
+    def _fact(self, command: c.Fact) -> None:
+        fact = Fact(command.claim, tuple(node_at(self.root, path) for path in command.nodes))
+        self.steps.state(fact) if command.stated else self.steps.retract(fact)
 
     def _gate(self, command: c.Gate) -> None:
         target, by = node_at(self.root, command.path), node_at(self.root, command.by)

@@ -1,4 +1,4 @@
-"""Puts a node of another type in the place of a node: name, options, edges, gates, promotions and notes stay (rule R4).
+"""Puts a node of another type in the place of a node: name, options, edges, gates, facts and notes stay (rule R4).
 
 Depends on `steps`.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from hfg.errors import GraphError, HfgError
-from hfg.graph.editing.changes import EdgeChange, EdgeSwap, GateChange, NodeChange, NodeSwap
+from hfg.graph.editing.changes import EdgeChange, EdgeSwap, FactsMoved, GateChange, NodeChange, NodeSwap
 from hfg.graph.editing.steps import Promoted, Steps, edges_of
 from hfg.graph.structure.adding import add, need_fitting
 from hfg.graph.structure.declaring import refuse_standing
@@ -69,6 +69,7 @@ def _replace_box(steps: Steps, around: Level, old: Node, new: Node, edges: list[
     steps.do(NodeChange(around, name, new, added.options, position, added.inside, added=True))
     for spot, edge in zip(spots, edges, strict=True):
         steps.do(EdgeChange(around, edge, spot, added=True))
+    steps.do(FactsMoved(steps.root.whole.facts, old, new))
     for level, gate in gates:
         steps.do(GateChange(level, _gate_of(gate, old, new), len(level.gates.listed), added=True))
     steps.set_promotions(around, _promoted_by(around, promoted, old, new))

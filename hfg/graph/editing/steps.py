@@ -20,6 +20,7 @@ from hfg.graph.editing.changes import (
     Change,
     EdgeChange,
     EdgeSwap,
+    FactChange,
     GateChange,
     GroupsChange,
     NodeChange,
@@ -38,6 +39,7 @@ from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.connecting import declare_edge, refuse
 from hfg.graph.structure.declaring import move, need_new_port, refuse_gate, refuse_promotion, stands_for
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of
+from hfg.graph.structure.facts import Fact, facts_of, refuse_fact
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.given import edge_options, group_spec
 from hfg.graph.structure.level import Level, inside, level_of, nodes_within
@@ -215,6 +217,25 @@ class Steps:
             )
         level = level or side
         self.do(GateChange(level, gate, len(level.gates.listed), added=True))
+
+    def state(self, fact: Fact) -> None:
+        """State a fact, unless it is stated."""
+        refuse_fact(self.root, fact)
+        facts = self.root.whole.facts
+        if not any(one.says(fact) for one in facts_of(self.root)):
+            self.do(FactChange(facts, fact, len(facts), added=True))
+
+    def retract(self, fact: Fact) -> None:
+        """Take a fact back.
+
+        Raises:
+          GraphError: it is not stated.
+        """
+        facts = self.root.whole.facts
+        known = next((number for number, one in enumerate(facts) if one.says(fact)), None)
+        if known is None:
+            raise GraphError(f"it is not stated that {fact}; graph.facts lists the facts that are")
+        self.do(FactChange(facts, facts[known], known, added=False))
 
     def ungate(self, level: Level, gate: Gate) -> None:
         """Remove a gate."""

@@ -23,6 +23,7 @@ from hfg.graph.editing.document import (
     BoxDocument,
     Document,
     EdgeDocument,
+    FactDocument,
     GateDocument,
     GroupDocument,
     InsideDocument,
@@ -31,6 +32,7 @@ from hfg.graph.editing.document import (
 from hfg.graph.editing.type_texts import text_of_type
 from hfg.graph.structure.adding import add
 from hfg.graph.structure.edge import Edge, SourceEnd, end_path, is_feed
+from hfg.graph.structure.facts import facts_of
 from hfg.graph.structure.level import Level, Whole, inside, level_of
 from hfg.graph.structure.operators import NamedOperator
 from hfg.graph.structure.options import EdgeGiven, GroupGiven, GroupSpec
@@ -75,6 +77,7 @@ class Describer:
             document.inputs[name] = self._type(port.type, f'input "{name}"', " of the graph")
         for name, out in root.ports.outputs.items():
             document.outputs[name] = self._type(out.type, f'output "{name}"', " of the graph")
+        document.facts = [FactDocument(fact.claim, [node.place.path for node in fact.nodes]) for fact in facts_of(root)]
         self._waiting.append((document, root))
         while self._waiting:
             box, level = self._waiting.pop(0)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol
 
+from hfg.base.hooks import hooks
 from hfg.errors import UsageError
 from hfg.graph.structure.boundary import Boundary
 from hfg.graph.structure.connections import Connections
@@ -183,11 +184,23 @@ class Whole:
       gated: nodes that have a gate, of which each has at most one (rule A11); written by the levels' `Gates`.
       run: the run it has, if any; a graph has one at a time.
       takes_commands: commands are being carried out, which a run follows and the history knows.
+      facts: what users state about activity; those of removed nodes stay, because an undo brings the nodes back.
       notes: of editors, by node; None: those about the whole. Nothing else reads them, and they go with their node.
       history: of edits; only the code that edits interprets its objects.
     """
 
-    __slots__ = ("box_type", "gated", "groups", "history", "make_face", "notes", "root", "run", "takes_commands")
+    __slots__ = (
+        "box_type",
+        "facts",
+        "gated",
+        "groups",
+        "history",
+        "make_face",
+        "notes",
+        "root",
+        "run",
+        "takes_commands",
+    )
 
     root: Level
 
@@ -196,14 +209,17 @@ class Whole:
         self.box_type = box_type
         self.groups = Groups()
         self.gated: set[Node] = set()
+        self.facts: list[Any] = []
         self.run: object | None = None
         self.takes_commands = False
         self.notes: dict[Node | None, dict[str, Any]] = {}
         self.history: History[Any] = History(lambda: self.root.title)
 
     def begin_run(self, run: object) -> None:
-        """From now on only commands change the structure."""
+        """From now on only commands change the structure. A debug run also checks the facts that are stated."""
         self.run = run
+        if self.facts:
+            hooks.watch_facts(run)
 
     def end_run(self) -> None:
         """It may be changed by hand again."""
