@@ -25,6 +25,7 @@ FLOORS = {
     "hfg.base": 0,
     "hfg.encoding": 0,
     "hfg.images": 0,
+    "hfg.geometry": 0,
     "hfg.panels": 0,
     "hfg.trace": 0,
     "hfg.ports": 1,

@@ -22,6 +22,7 @@ from typing import Any, Final, Literal
 
 import annotated_types
 import numpy as np
+from hypothesis import reject
 from hypothesis import strategies as st
 
 from hfg.base.generics import callable_parts
@@ -386,9 +387,14 @@ def _record(kind: Any, alike: Alike | None) -> st.SearchStrategy[Any]:
 def _records(kind: Any, alike: Alike | None) -> st.SearchStrategy[Any]:
     hints = typing.get_type_hints(kind, include_extras=True)
     names = names_of(kind, given=True) or list(hints)
-    return st.fixed_dictionaries({name: _values(hints.get(name, Any), (), alike) for name in names}).map(
-        lambda fields: kind(**fields)
-    )
+
+    def made(fields: dict[str, Any]) -> Any:
+        try:
+            return kind(**fields)
+        except ValueError:  # what the record itself refuses
+            reject()
+
+    return st.fixed_dictionaries({name: _values(hints.get(name, Any), (), alike) for name in names}).map(made)
 
 
 # --- arrays ---
