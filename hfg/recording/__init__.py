@@ -16,6 +16,7 @@ layout      where everything is in a file, damaged or not
 chunks      the contents of a chunk, within bounds
 messages    the form of a token in it
 schemas     JSON schemas, Foxglove's for images
+foxglove    Foxglove's schemas for scans, clouds, grids, poses and transforms
 values      values as JSON and back, bit for bit
 """
 

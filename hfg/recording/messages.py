@@ -17,7 +17,7 @@ import numpy as np
 from hfg.base.token import Token
 from hfg.encoding.pictures import need_fair_size
 from hfg.errors import UsageError
-from hfg.recording import schemas
+from hfg.recording import foxglove, schemas
 from hfg.recording.forms import is_plain
 from hfg.recording.values import CannotKeep, Codec
 from hfg.trace import TraceEvent
@@ -199,6 +199,7 @@ class TokenWriter:
         self.firings: Firings | None = None
         self.images = images
         self.is_image = schemas.is_image(hint)
+        self._shown = foxglove.shown(hint)
         codec = Codec(hint, may_pickle=may_pickle)
         self.keep: Callable[[Any], tuple[Any, int]] | None = None
         self.metadata: dict[str, str] = {}
@@ -207,6 +208,10 @@ class TokenWriter:
             self.schema_name = "foxglove.RawImage" if images == "raw" else "foxglove.CompressedImage"
             schema = schemas.RAW_IMAGE if images == "raw" else schemas.COMPRESSED_IMAGE
             self.schema = msgspec.json.encode(schema)
+        elif self._shown is not None:
+            self.keep = self._keep_shown
+            self.schema_name = self._shown.name
+            self.schema = self._shown.schema(schemas.value_schema(hint), schemas.TOKEN)
         else:
             if not is_plain(hint):
                 self.keep = self._keep
@@ -219,6 +224,14 @@ class TokenWriter:
         before = codec.bytes_kept
         return codec.encode(value), codec.bytes_kept - before
 
+    def _keep_shown(self, value: Any) -> tuple[Any, int]:
+        kept, size = self._keep(value)
+        try:
+            fields = self._shown.fields(value) if self._shown is not None else {}
+        except (AttributeError, TypeError):  # a value of another type than the port's: only hfg can read it
+            fields = {}
+        return {**fields, "value": kept}, 2 * size
+
     def _keep_image(self, value: Any) -> tuple[np.ndarray[Any, Any], int]:
         if not isinstance(value, np.ndarray) or schemas.encoding_of(value) is None:
             raise CannotKeep(f"{describe_value(value)} is not an image")
@@ -228,6 +241,11 @@ class TokenWriter:
         """Return the data to encode; `time`: when the token was sent, if that is to be written."""
         if self.is_image:
             return self._image(token, time, firing)
+        if self._shown is not None:
+            told = circumstances(token, time, firing).items()
+            rest = {name: one for name, one in told if one or (one is not None and name in ("time", "began"))}
+            said = {"stamp": token.stamp, "activity": token.activity, "sequence": token.sequence}
+            return {**token.value, **said, **rest}
         value = token.value
         kind = type(value)
         if self.keep is None and (kind is str or (kind is float and not isfinite(value))):

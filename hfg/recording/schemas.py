@@ -23,7 +23,7 @@ _TIME: Final = {
         "nsec": {"type": "integer", "minimum": 0, "maximum": 999999999},
     },
 }
-_TOKEN: Final[dict[str, Any]] = {
+TOKEN: Final[dict[str, Any]] = {
     "activity": {"type": "integer", "enum": [-1, 0, 1], "description": "The token's activity modifier"},
     "stamp": {"type": "number", "description": "Seconds on the run's clock"},
     "sequence": {"type": "integer", "description": "Number of the token on its edge, from 1"},
@@ -52,7 +52,7 @@ RAW_IMAGE: Final[dict[str, Any]] = {
         "data": {**_BYTES, "description": "Raw image data"},
         "dtype": {"type": "string", "description": "Of numpy"},
         "shape": {"type": "array", "items": {"type": "integer"}, "description": "Of numpy"},
-        **_TOKEN,
+        **TOKEN,
     },
 }
 COMPRESSED_IMAGE: Final[dict[str, Any]] = {
@@ -66,7 +66,7 @@ COMPRESSED_IMAGE: Final[dict[str, Any]] = {
         "data": {**_BYTES, "description": "Compressed image data"},
         "format": {"type": "string", "description": "Image format"},
         "shape": {"type": "array", "items": {"type": "integer"}, "description": "Of numpy"},
-        **_TOKEN,
+        **TOKEN,
     },
 }
 
@@ -102,7 +102,7 @@ def message_schema(hint: Any) -> bytes:
             "$schema": "https://json-schema.org/draft/2020-12/schema",
             "title": f"hfg token of {describe(hint)}",
             "type": "object",
-            "properties": {"value": _schema(hint, 0), **_TOKEN},
+            "properties": {"value": value_schema(hint), **TOKEN},
             "required": ["value", "stamp"],
         }
     )
@@ -126,7 +126,7 @@ _SIMPLE: Final[dict[Any, dict[str, Any]]] = {
 }
 
 
-def _schema(hint: Any, depth: int) -> dict[str, Any]:
+def value_schema(hint: Any, depth: int = 0) -> dict[str, Any]:
     """Return the schema of values that are exactly of the type; other values are objects with "$type"."""
     hint = bare(hint)
     if depth > _DEEPEST:
@@ -136,7 +136,7 @@ def _schema(hint: Any, depth: int) -> dict[str, Any]:
     form = form_of(hint)
     match form.kind:
         case "fields":
-            properties = {name: _schema(one, depth + 1) for name, one in form.of.items()}
+            properties = {name: value_schema(one, depth + 1) for name, one in form.of.items()}
             return {"type": "object", "title": hint.__name__, "properties": properties}
         case "enum":
             return {"enum": [one.name for one in hint]}
@@ -147,7 +147,7 @@ def _schema(hint: Any, depth: int) -> dict[str, Any]:
         case "list" | "tuple":
             arguments = typing.get_args(hint)
             items = {one for one in arguments if one is not Ellipsis} if _all_hashable(arguments) else set()
-            of_items = {"items": _schema(items.pop(), depth + 1)} if len(items) == 1 else {}
+            of_items = {"items": value_schema(items.pop(), depth + 1)} if len(items) == 1 else {}
             return {"type": ["array", "object"], **of_items}
         case "dict":
             return {"type": "object"}
