@@ -67,6 +67,7 @@ if __name__ == "__main__":
 
 import hfg  # noqa: E402 - with what is declared above
 from hfg.cli import run as cli  # noqa: E402
+from hfg.cli.options import with_flags  # noqa: E402
 from hfg.errors import HfgError  # noqa: E402
 from hfg.files import schema, text_of  # noqa: E402
 from hfg.files.describing import describe  # noqa: E402
@@ -202,7 +203,7 @@ def _run() -> Any:
 
 
 def _on_the_command_line() -> Any:
-    flags = inspect.signature(cli.run).parameters
+    flags = inspect.signature(with_flags(cli.run)).parameters
     return [flags["lap"].default, "--lap" in str(vars(flags["lap"].annotation.__metadata__[0]))]
 
 
