@@ -5,9 +5,11 @@ Equal options are one object: ten thousand nodes with nothing special share thei
 
 from __future__ import annotations
 
+import builtins
 import contextlib
 import functools
 import os
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -16,7 +18,6 @@ from hfg.base.controls import name_problem
 from hfg.errors import GraphError
 from hfg.graph.structure.option import declared, refuse_values, unknown
 from hfg.graph.structure.options import ACTIVE, PLAIN, PLAIN_NODE, EdgeOptions, GroupSpec, NodeOptions
-from hfg.graph.structure.retrying import error_names
 
 # --- edges ---
 
@@ -104,7 +105,7 @@ def node_options(where: str, given: Mapping[str, Any]) -> NodeOptions:
         raise GraphError(f"{where}: {wrong}")
     said = dict(given)
     if "retry_on" in said:
-        said["retry_on"] = error_names(where, said["retry_on"], retries=said.get("retries", 0))
+        said["retry_on"] = _error_names(where, said["retry_on"], retries=said.get("retries", 0))
     with contextlib.suppress(GraphError, TypeError):  # TypeError: one that cannot be hashed, so it is invalid
         return _right_options(**said)
     return _checked(where, said)  # which refuses them in the name of the node
@@ -118,6 +119,56 @@ def _right_options(**said: Any) -> NodeOptions:  # noqa: ANN401 - each checked b
 def _checked(where: str, said: dict[str, Any]) -> NodeOptions:
     refuse_values(NodeOptions, where, said, GraphError)
     return NodeOptions(**said)
+
+
+def _error_names(where: str, given: object, *, retries: object) -> tuple[str, ...]:
+    """Return the names of errors, which may be given as classes or by name; nothing is imported for them.
+
+    A name is compared with those of the error that was raised and of its bases, so one of a module that is not loaded
+    does no harm, and a graph file brings no code with it.
+
+    Raises:
+      GraphError: one of them is not an error, or nothing is tried again at all; the message begins with `where`.
+    """
+    if isinstance(given, str | type):
+        given = (given,)
+    if not isinstance(given, Iterable):
+        raise GraphError(f"{where}: retry_on takes errors, as in retry_on=(ConnectionError,), got {given!r}")
+    names = tuple(_error_name(where, error) for error in given)
+    if names and not retries:
+        raise GraphError(
+            f"{where}: retry_on=({', '.join(names)},) says which errors are tried again, and retries=0 tries none; "
+            "add retries=3"
+        )
+    return names
+
+
+def _error_name(where: str, error: object) -> str:
+    """Name one error; what has no module in its name is built in."""
+    if isinstance(error, str):
+        module, _, name = error.rpartition(":")
+        if module and module not in sys.modules:
+            return error  # what raises it brings its module, and until then nothing can
+        found: Any = sys.modules[module] if module else builtins
+        for part in name.split("."):
+            found = getattr(found, "__dict__", {}).get(part)  # which runs no code, as getattr might
+        if found is None:
+            raise GraphError(
+                f'{where}: retry_on names "{error}", and there is no such error; built-in ones are written '
+                '"ConnectionError", others with their module, "my_robot.nodes:NoAnswer"'
+            )
+    else:
+        found = error
+    if not isinstance(found, type) or not issubclass(found, Exception):
+        raise GraphError(
+            f"{where}: retry_on takes classes of errors, as in retry_on=(ConnectionError,), got {error!r}"
+            + (", which ends a task or the program on purpose and is not tried again" if _is_exit(found) else "")
+        )
+    return found.__qualname__ if found.__module__ == "builtins" else f"{found.__module__}:{found.__qualname__}"
+
+
+def _is_exit(found: object) -> bool:
+    return isinstance(found, type) and issubclass(found, BaseException)
 
 
 # --- groups ---

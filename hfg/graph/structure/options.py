@@ -19,8 +19,8 @@ import msgspec
 from typing_extensions import TypeVar
 
 from hfg.graph.structure.option import Fields, Option, documented
-from hfg.graph.structure.retrying import Errors
 
+Errors: TypeAlias = Iterable[type[Exception] | str] | type[Exception] | str
 OnError: TypeAlias = Literal["stop", "skip", "disable", "restart"]
 Release: TypeAlias = Literal["auto", "sequential", "pipelined"]
 Overflow: TypeAlias = Literal["wait", "drop_oldest", "drop_newest", "latest", "error"]

@@ -20,11 +20,6 @@ ROOT: Final = -1
 _BOUNDARIES: Final = -1_000_000
 
 
-def box_owner(box: int) -> int:
-    """The owner of a subgraph's automatic ports."""
-    return -2 - box
-
-
 def is_box(owner: int) -> bool:
     """Return whether ports of this owner are those of a dissolved subgraph."""
     return _BOUNDARIES < owner < ROOT
