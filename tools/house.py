@@ -30,6 +30,7 @@ LARGEST = 5
 MOST_LINES_OF_A_FUNCTION = 40
 MOST_LINES_OF_A_MODULE = 400
 Figures = dict[str, str]
+_DESCRIBED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
 def main() -> int:
@@ -66,6 +67,7 @@ def figures(source: Path) -> Figures:
         parts[_component(name)] += number
     found: Figures = {"lines": f"{sum(parts.values()):,}"}
     found |= {f"lines of {part}": f"{number:,}" for part, number in sorted(parts.items()) if part != "hfg"}
+    found |= {f"lines that are {kind}": f"{number:,}" for kind, number in sorted(_kinds(files.values()).items())}
     found["modules"] = str(len(files))
     found["components (modules and packages of hfg)"] = str(len(parts))
     found["packages with their subpackages"] = str(sum(file.name == "__init__.py" for file in files.values()))
@@ -97,6 +99,26 @@ def table(columns: Mapping[str, Figures]) -> Iterator[str]:
     yield "|---|" + "--:|" * len(columns)
     for name in names:
         yield "| " + " | ".join([name, *(column.get(name, "") for column in columns.values())]) + " |"
+
+
+def _kinds(files: Iterable[Path]) -> Counter[str]:
+    """Count lines by what they are: code, imports, docstrings, comments of their own, or blank."""
+    found = Counter[str]()
+    for file in files:
+        lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
+        kinds = ["blank" if not line else "comments" if line.startswith("#") else "code" for line in lines]
+        for one in ast.walk(parsed(file)):
+            if isinstance(one, ast.Import | ast.ImportFrom):
+                _mark(kinds, one, "imports")
+            elif isinstance(one, _DESCRIBED) and ast.get_docstring(one, clean=False) is not None:
+                _mark(kinds, one.body[0], "docstrings")
+        found.update(kinds)
+    return found
+
+
+def _mark(kinds: list[str], part: ast.stmt, kind: str) -> None:
+    end = part.end_lineno or part.lineno
+    kinds[part.lineno - 1 : end] = [kind] * (end - part.lineno + 1)
 
 
 def _component(module: str) -> str:

@@ -6,7 +6,6 @@ Depends on `flat`.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from hfg.errors import Problem
 from hfg.graph.flat import ROOT, FlatEdge, FlatGraph
@@ -18,8 +17,8 @@ from hfg.types import describe, why_not
 
 def joined_edges(flat: FlatGraph) -> Iterator[Problem]:
     """The options of each part of an edge through subgraphs must fit the whole edge (rules P2, P3, P4, P7)."""
-    into: dict[Any, FlatEdge] = {}
-    pairs: dict[Any, FlatEdge] = {}
+    into: dict[object, FlatEdge] = {}
+    pairs: dict[object, FlatEdge] = {}
     for edge in flat.edges:
         kind = edge.target.kind
         if kind == "slot":

@@ -16,7 +16,7 @@ import tokenize
 import types
 from collections import deque
 from collections.abc import Iterable, Iterator
-from typing import Any, Final
+from typing import Final
 
 from hfg.graph.flat import ROOT, FlatGraph, FlatNode, scope_end
 from hfg.nodetypes.description import NodeType
@@ -168,7 +168,7 @@ class _Judge:
         kind = self._kind
         if not isinstance(code.value, ast.Name) or not self._self or code.value.id != self._self:
             return False
-        known: Iterable[Any] = (*kind.states, *kind.parameters, *kind.outputs, *kind.events)
+        known: Iterable[str] = (*kind.states, *kind.parameters, *kind.outputs, *kind.events)
         return code.attr in known or not hasattr(kind.origin, code.attr)
 
     def _is_sending(self, code: ast.Attribute) -> bool:

@@ -8,13 +8,13 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator
 from types import CodeType, FunctionType
-from typing import Any
 
 from hfg.errors import Problem
 from hfg.graph.flat import FlatGraph
 from hfg.graph.structure.level import inside
 from hfg.graph.structure.naming import suggest
 from hfg.graph.structure.options import NodeOptions
+from hfg.nodetypes.description import NodeType
 from hfg.nodetypes.node import Node
 from hfg.ports import Port
 
@@ -45,7 +45,7 @@ def _members(flat: FlatGraph) -> Iterator[tuple[str, Node, NodeOptions]]:
 
 def names(whole: FlatGraph) -> list[Problem]:
     """Types that no file or worker can find again; each told once."""
-    found: dict[Any, tuple[str, int]] = {}
+    found: dict[NodeType, tuple[str, int]] = {}
     for flat in whole.walk():
         for path, node, _ in _members(flat):
             first, count = found.get(node._type, (path, 0))
@@ -103,7 +103,7 @@ def needs_loop(node: Node) -> str:
 def _begins_tasks(cls: type) -> bool:
     """Whether methods of a node class begin tasks: they themselves, or functions and helper classes that they name."""
     waiting = list(functions_of(cls, until=Node))
-    seen: set[Any] = set()
+    seen: set[object] = set()
     while waiting:
         function = waiting.pop()
         if function in seen:

@@ -39,7 +39,7 @@ class _Look:
         self.open, self.hidden_in = _opened(level, view)
         self.lit = _lit(level, view)
         self.picture = Picture(level.path or level.name, [], [], list(level.whole.groups.by_name))
-        self.ids: dict[Any, str] = {}  # of nodes, and of ports that are drawn by themselves
+        self.ids: dict[object, str] = {}  # of nodes, and of ports that are drawn by themselves
         self.shapes: dict[str, Shape] = {}
         self.boxes = 0
         self.edges = [edge for one in self.open for edge in one.edges]
@@ -253,9 +253,9 @@ def _depth_first(level: Level) -> Iterator[Level]:
         waiting += [inner for node in reversed(one.nodes.values()) if (inner := inside(node)) is not None]
 
 
-def _ports_of_boxes(edges: Iterable[Edge]) -> dict[Any, dict[Any, str]]:
+def _ports_of_boxes(edges: Iterable[Edge]) -> dict[object, dict[Any, str]]:
     """Return for each subgraph its ports that have an edge outside or inside, with their names."""
-    found: dict[Any, dict[Any, str]] = {}
+    found: dict[object, dict[Any, str]] = {}
     for edge in edges:
         for end in (edge.source, edge.target):
             if not is_feed(end) and is_box(end.node):

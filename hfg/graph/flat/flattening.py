@@ -79,14 +79,14 @@ class EdgeFollower:
     def __init__(self, flat: FlatGraph, levels: list[tuple[Level, int]]) -> None:
         self.flat = flat
         self.levels = levels
-        self.ends: dict[Any, End] = {}  # by port: both ends of a port are the same, but for parameters as well
+        self.ends: dict[object, End] = {}  # by port: both ends of a port are the same, but for parameters as well
         self.labels: dict[str, int] = {}
         self.index_of = {node.node: node.index for node in flat.nodes}
-        self.scope_of: Mapping[Any, Any] = {scope.subgraph: scope.index for scope in flat.scopes}
+        self.scope_of: Mapping[object, int] = {scope.subgraph: scope.index for scope in flat.scopes}
         self.depth_of: dict[Edge, int] = {}
         # The edges that continue after a port of a dissolved subgraph: inside after inputs and slots, outside after
         # outputs and events.
-        self.behind: dict[Any, list[Edge]] = {}
+        self.behind: dict[object, list[Edge]] = {}
 
     def collect(self) -> None:
         """Fill edges and gates."""
