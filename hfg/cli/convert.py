@@ -17,6 +17,7 @@ from hfg.cli.options import LoadFlags
 from hfg.cli.target import SUFFIXES, import_from_here, load_graph
 from hfg.errors import TargetError, UsageError
 from hfg.files import apex, describe, save, schema, text_of, write
+from hfg.graph import Graph
 
 
 def convert(
@@ -56,7 +57,10 @@ def convert(
         return _import_apex(target, out, json)
     if json:
         raise TargetError("--json tells what became of a file of CS::APEX; leave it out")
-    graph = load_graph(target, flags.arg, flags.allow)
+    return _save(load_graph(target, flags.arg, flags.allow), out)
+
+
+def _save(graph: Graph, out: Path | None) -> int:
     if out is None:
         show.write(text_of(describe(graph, beside=Path("graph.hfg.yaml"))))
         return 0

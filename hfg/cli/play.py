@@ -38,14 +38,11 @@ def play(
     verbose: VerboseOption = 0,
 ) -> int:
     """Play a recording into a graph, in place of the recorded sources."""
-    ports = dict(_pair(one) for one in mapped or [])
+    ports = dict(_pair(one) for one in mapped or []) or None
     played: list[Playing] = []
 
     def prepare(graph: Graph) -> None:
-        try:
-            played.append(play_into(graph, file, ports=ports or None, speed=_factor(speed), pickle=pickle))
-        except (UsageError, GraphError) as wrong:
-            raise TargetError(str(wrong)) from None
+        played.append(_played(graph, file, ports, _factor(speed), pickle=pickle))
 
     running = GraphRun.load(into, flags, verbose=verbose, prepare=prepare)
     for path in played[0].rest:
@@ -61,6 +58,13 @@ def play(
         running.run(begin)
     code = told(recordings[0]) if recordings else 0
     return running.ended(verbose=verbose) or code or int(played[0].is_damaged)
+
+
+def _played(graph: Graph, file: Path, ports: dict[str, str] | None, speed: float | None, *, pickle: bool) -> Playing:
+    try:
+        return play_into(graph, file, ports=ports, speed=speed, pickle=pickle)
+    except (UsageError, GraphError) as wrong:
+        raise TargetError(str(wrong)) from None
 
 
 def _pair(text: str) -> tuple[str, str]:
