@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any
 from hfg.base.hooks import hooks
 
 if TYPE_CHECKING:
+    from hfg.engine import Run
     from hfg.graph import Graph
     from hfg.graph.flat import FlatGraph
+    from hfg.graph.structure.level import Whole
     from hfg.parts.distribution import Distribution
 
 __all__: list[str] = []
@@ -110,7 +112,22 @@ def _states(graph: Any) -> Any:
     return analyse_activity(graph).diagram().graph()
 
 
+def _monitor(run: Run, whole: Whole) -> None:
+    """Implement `hooks.monitor`; monitors are imported only if there is one, now or after an edit."""
+
+    def judge() -> None:
+        from hfg.monitors.judging import judge
+
+        judge(run, whole)
+
+    if whole.monitors:
+        judge()
+    else:
+        whole.on_monitors = judge
+
+
 hooks.add_checks = _add_checks
+hooks.monitor = _monitor
 hooks.states = _states
 hooks.watch_facts = _watch_facts
 hooks.refusal = _refusal

@@ -50,6 +50,12 @@ FLOORS = {
     "hfg.parts.transports": 5,  # finds them, and knows nothing of parts
     "hfg.catalogue": 6,
     "hfg.monitors": 6,
+    "hfg.monitors.reading": 2,  # the language is text and data, which graphs hold
+    "hfg.monitors.conditions": 2,
+    "hfg.monitors.formulas": 2,
+    "hfg.monitors.compiling": 2,
+    "hfg.monitors.properties": 2,
+    "hfg.monitors.parsing": 2,
     "hfg.cli": 7,
     "hfg.studio": 7,
     "hfg.composing": 7,  # puts what stands high where lower floors ask for it

@@ -22,6 +22,7 @@ class _Hooks:
         types, given which packages are allowed in addition; None if it may.
       watch_facts: `hfg.monitors.facts.watch_facts`, which lets a debug run check the facts of its graph.
       states: the state diagram of a graph, as a graph that is drawn.
+      monitor: `hfg.monitors.judging.judge`, which begins to judge a run by the monitors of its graph.
       add_checks: adds the checks of graphs that upper layers have, once.
     """
 
@@ -34,6 +35,7 @@ class _Hooks:
     states: Callable[[Any], Any]
     watch_facts: Callable[[Any], None]
     add_checks: Callable[[], None]
+    monitor: Callable[[Any, Any], None]
 
 
 hooks = _Hooks()

@@ -50,6 +50,14 @@ ParamOption = Annotated[
         autocompletion=completing.parameters,
     ),
 ]
+MonitorOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="PROPERTY",
+        help="What must hold of the run, as in 'never(active(driving) & sent(drive.lamp, value == true))', or with a "
+        "name, 'dark=never(...)'. If it is violated, the exit status is 1. Can be repeated.",
+    ),
+]
 ArgOption = Annotated[
     list[str] | None,
     typer.Option(

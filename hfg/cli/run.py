@@ -15,12 +15,14 @@ import typer
 from hfg.base.whole import GrowingFile
 from hfg.cli import show
 from hfg.cli.execute import GraphRun
-from hfg.cli.options import RunFlags, SettingsOption, TableOption, TargetArgument, VerboseOption
+from hfg.cli.options import MonitorOption, RunFlags, SettingsOption, TableOption, TargetArgument, VerboseOption
 from hfg.engine import Run
 from hfg.engine.observing.encoding import encode
 from hfg.engine.observing.report import RunPage
 from hfg.engine.runtime.settings import RunFields
-from hfg.errors import TargetError
+from hfg.errors import GraphError, TargetError
+from hfg.graph import Graph
+from hfg.monitors import declared
 from hfg.timeline import Timeline
 from hfg.trace import TraceEvent
 
@@ -31,6 +33,7 @@ def run(
     target: TargetArgument,
     flags: RunFlags,
     options: RunFields,  # those that declare a flag
+    monitor: MonitorOption = None,
     settings: SettingsOption = None,
     trace: Annotated[
         Path | None,
@@ -60,6 +63,7 @@ def run(
 ) -> int:
     """Run a graph. Ctrl-C stops it; a second Ctrl-C stops it immediately."""
     running = GraphRun.load(target, flags, verbose=verbose)
+    _declare(running.graph, monitor or ())
     output = _Output(sys.stdout)
     unwritten: list[str] = []
     pages: list[RunPage] = []
@@ -89,7 +93,19 @@ def run(
         show.json(running.report)
     for explained in runs if explain else ():
         show.explanations(explained.explain())
-    return running.ended(verbose=verbose, reports=not json or verbose > 0) or int(bool(unwritten))
+    violated = monitor and any(declared(one).violations for one in runs)
+    return running.ended(verbose=verbose, reports=not json or verbose > 0) or int(bool(unwritten or violated))
+
+
+def _declare(graph: Graph, properties: Iterable[str]) -> None:
+    """Declare the monitors that are given in the call, with their names or numbered."""
+    for number, text in enumerate(properties, 1):
+        name, equals, rest = text.partition("=")
+        named = bool(equals) and name.isidentifier()
+        try:
+            graph.monitor(name if named else f"monitor_{number}", rest if named else text)
+        except GraphError as error:
+            raise TargetError(str(error)) from None
 
 
 @contextmanager

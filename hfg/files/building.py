@@ -331,7 +331,7 @@ class _Builder(Builder):
         lines = self.read.lines
         line = next((lines[key[:end]] for end in range(len(key), 0, -1) if key[:end] in lines), 0)
         where = path or graph_path(key)
-        sentence = str(error).removeprefix(f'node "{where}": ')
+        sentence = str(error).removeprefix(f'node "{where}": ').removeprefix(f"{where}: ")
         self.loading.findings.add(self.read.file, line, where, sentence)
 
     @override

@@ -99,6 +99,8 @@ def graph_path(key: Key, edges: Any = None) -> str:
             return f"facts[{number}]"
         case ["groups", str() as name, *_]:
             return f'group "{name}"'
+        case ["monitors", str() as name, *_]:
+            return f'monitor "{name}"'
         case [name, *_]:
             return f"{path}.{name}" if path else str(name)
     return path

@@ -15,7 +15,7 @@ import msgspec
 
 from hfg.graph.editing import document
 from hfg.graph.editing.commands import Operator
-from hfg.graph.editing.document import VERSION, Document, EdgeDocument
+from hfg.graph.editing.document import VERSION, Document, EdgeDocument, MonitorDocument
 from hfg.graph.structure.option import Fields, declared
 
 _LABEL: Final = {
@@ -39,6 +39,13 @@ def json_schema() -> dict[str, Any]:
     components["Operator"] = {
         "title": Operator.__name__,
         "anyOf": [{"type": "string", "description": "its reference, where it is given nothing"}, operator],
+    }
+    components["MonitorDocument"] = {
+        "title": MonitorDocument.__name__,
+        "anyOf": [
+            {"type": "string", "description": "its property, where it has no options"},
+            components["MonitorDocument"],
+        ],
     }
     components["EdgeDocument"] = _edge(components["EdgeDocument"])
     components["NodeDocument"]["anyOf"] = [{"required": [name]} for name in ("type", "file", "graph")]

@@ -19,7 +19,7 @@ from hfg.base.controls import name_problem
 from hfg.files.findings import Findings, Lines, graph_path
 from hfg.files.opening import SUFFIX, bytes_of, text_in
 from hfg.files.parsing import Located, parse, plain
-from hfg.graph.editing.document import VERSION, Document, EdgeDocument, NodeDocument, OperatorDocument
+from hfg.graph.editing.document import VERSION, Document, EdgeDocument, MonitorDocument, NodeDocument, OperatorDocument
 from hfg.graph.editing.from_document import Key
 
 _ARROW: Final = " -> "
@@ -121,6 +121,8 @@ class _Reading:
                     return self.edge(found, key)
                 if cls is OperatorDocument and isinstance(found.value, str):
                     return OperatorDocument(found.value)
+                if cls is MonitorDocument and isinstance(found.value, str):
+                    return MonitorDocument(property=found.value)
                 return self.struct(found, cls, key)
             case inspect.DictType(value_type=inner):
                 return self.mapping(found, inner, key)

@@ -14,11 +14,12 @@ from hfg.graph.editing.document import (
     Document,
     EdgeDocument,
     GroupDocument,
+    MonitorDocument,
     NodeDocument,
     OperatorDocument,
 )
 
-_FIRST: Final = ("hfg", "name", "notes", "groups")
+_FIRST: Final = ("hfg", "name", "notes", "groups", "monitors")
 _ARROW: Final = " -> "
 
 
@@ -57,6 +58,9 @@ def _plain(value: Any) -> Any:
         case OperatorDocument():
             found = _struct(value)
             return value.type if len(found) == 1 else found
+        case MonitorDocument():
+            found = _struct(value)
+            return value.property if len(found) == 1 else {"property": found.pop("property"), **found}
         case dict():
             return {name: _plain(one) for name, one in value.items()}
         case list() | tuple():

@@ -16,7 +16,16 @@ from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.operators import operator
-from hfg.graph.structure.options import EdgeGiven, EdgeOptions, GroupGiven, GroupSpec, NodeGiven, NodeOptions
+from hfg.graph.structure.options import (
+    EdgeGiven,
+    EdgeOptions,
+    GroupGiven,
+    GroupSpec,
+    MonitorGiven,
+    MonitorSpec,
+    NodeGiven,
+    NodeOptions,
+)
 
 __all__ = [
     "Edge",
@@ -28,6 +37,8 @@ __all__ = [
     "GraphOutput",
     "GroupGiven",
     "GroupSpec",
+    "MonitorGiven",
+    "MonitorSpec",
     "NodeGiven",
     "NodeOptions",
     "Subgraph",

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Callable, Iterable
-from types import ModuleType
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType, ModuleType
 from typing import Any, ClassVar, Final, Literal, Never, TypeAlias, TypeVar, Unpack, overload
 
 from reactivex import Observable
@@ -31,11 +31,22 @@ from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.facts import Fact, facts_of, state_fact
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level, Whole, inside
+from hfg.graph.structure.monitors import declare_monitor
 from hfg.graph.structure.naming import need_name
 from hfg.graph.structure.option import Fields, unknown
-from hfg.graph.structure.options import EdgeGiven, EdgeOptions, GroupGiven, GroupSpec, NodeGiven, NodeOptions
+from hfg.graph.structure.options import (
+    EdgeGiven,
+    EdgeOptions,
+    GroupGiven,
+    GroupSpec,
+    MonitorGiven,
+    MonitorSpec,
+    NodeGiven,
+    NodeOptions,
+)
 from hfg.graph.structure.paths import find, node_at
 from hfg.graph.structure.subgraph import Box
+from hfg.monitors.properties import Property
 from hfg.nodetypes.node import Node, Place
 from hfg.ports import EventPort, ParameterPort, Port, SlotPort, Source, Target
 
@@ -276,6 +287,27 @@ class Graph:
         Otherwise like `at_most_one`.
         """
         return state_fact(self._level, "exactly one", nodes)
+
+    # --- monitors ---
+
+    @property
+    def monitors(self) -> Mapping[str, MonitorSpec]:
+        """The properties that must hold of each run of the whole graph, by name."""
+        return MappingProxyType(self._level.whole.monitors)
+
+    def monitor(self, name: str, property: Property | str, **options: Unpack[MonitorGiven]) -> None:  # noqa: A002
+        """Declare what must hold of each run; docs/howto/monitors.md describes the language.
+
+        Args:
+          name: for people, and for `hfg.monitors.declared(run)`.
+          property: made by functions of `hfg.monitors`, or its text: "never(active(driving))". Its paths begin at the
+            whole graph.
+          **options: what a violation does; docs/reference.md lists all options.
+
+        Raises:
+          GraphError: it is malformed, or another monitor has this name; nothing was changed.
+        """
+        declare_monitor(self._level, name, property, options)
 
     # --- ports of the whole ---
 

@@ -3,15 +3,22 @@
 formulas     what is true at a point: activity, values, firings, and what was true before
 compiling    a formula as one function
 properties   patterns over formulas, and what judges them
-watching     lets them be judged in a run
+parsing      reads them from text
+watching     lets them be judged in a run; needs the engine, so it is imported when it is used
+judging      judges each run of a graph by the monitors that the graph declares
 facts        the facts that are stated in the graph, in debug runs
 
 Examples:
   >>> from hfg import monitors as m
   >>> print(m.leads_to(m.sent("fetch.done"), m.sent("deliver.done") | m.sent("mission.report"), within_s=300))
-  leads_to(sent(fetch.done), (sent(deliver.done) | sent(mission.report)), within_s=300)
+  leads_to(sent(fetch.done), sent(deliver.done) | sent(mission.report), within_s=300)
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from hfg.base.lazy import on_demand
 from hfg.monitors.formulas import (
     Formula,
     active,
@@ -23,8 +30,16 @@ from hfg.monitors.formulas import (
     since,
     throughout,
 )
+from hfg.monitors.parsing import parse
 from hfg.monitors.properties import Property, Verdict, always, eventually, leads_to, never, precedes, until
-from hfg.monitors.watching import Monitors, Seen, Violation, watch
+
+if TYPE_CHECKING:
+    from hfg.monitors.judging import declared
+    from hfg.monitors.watching import Monitors, Seen, Violation, watch
+else:
+    __getattr__ = on_demand(
+        __name__, {"judging": ("declared",), "watching": ("Monitors", "Seen", "Violation", "watch")}
+    )
 
 __all__ = [
     "Formula",
@@ -36,11 +51,13 @@ __all__ = [
     "active",
     "always",
     "at_least",
+    "declared",
     "eventually",
     "fired",
     "leads_to",
     "never",
     "once",
+    "parse",
     "precedes",
     "previously",
     "sent",

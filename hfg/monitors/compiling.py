@@ -32,8 +32,6 @@ from hfg.monitors.formulas import (
     atoms_of,
 )
 
-__all__ = ["Atom", "Step", "compiled"]
-
 Atom = Active | Sent | Fired
 Step = Callable[..., tuple[bool, ...]]
 """Called at each point with its time in seconds and the truth of each atom; returns the truth of each formula."""

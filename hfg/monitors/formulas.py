@@ -3,40 +3,22 @@
 A *point* is a moment at which something happens that a formula names: a value passes a port, a node fires, the
 activity of a node changes. A formula is true or false at each point. The operators look back only, so that its truth is
 known at once: *past-time metric temporal logic* over points (Havelund and Roșu 2002; Thati and Roșu 2005). Depends on
-`errors`.
+`conditions`.
 """
 
 from __future__ import annotations
 
+import json
 import math
+import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any, NoReturn
+from dataclasses import dataclass, fields, replace
+from typing import Any, Final, NoReturn, Self
 
 from hfg.errors import HfgError, UsageError
+from hfg.monitors.conditions import Condition, parse_condition
 
-__all__ = [
-    "Active",
-    "And",
-    "Fired",
-    "Formula",
-    "Not",
-    "Or",
-    "Previously",
-    "Sent",
-    "Since",
-    "Times",
-    "active",
-    "at_least",
-    "atoms_of",
-    "fired",
-    "need_formula",
-    "once",
-    "previously",
-    "sent",
-    "since",
-    "throughout",
-]
+_PLAIN: Final = re.compile(r"[^\s,()&|~\"]+")
 
 
 class Formula:
@@ -68,6 +50,17 @@ class Formula:
         """Return the formulas that it consists of."""
         return ()
 
+    def moved(self, to: Callable[[str], str]) -> Self:
+        """Return the same formula about other paths: `to` gives that of each."""
+        changed: dict[str, Any] = {}
+        for field in fields(self):  # type: ignore[arg-type]  # all formulas are dataclasses
+            value = getattr(self, field.name)
+            if isinstance(value, Formula):
+                changed[field.name] = value.moved(to)
+            elif field.name in ("node", "port"):
+                changed[field.name] = to(value)
+        return replace(self, **changed)  # type: ignore[type-var]
+
 
 @dataclass(frozen=True, slots=True)
 class Active(Formula):
@@ -76,7 +69,7 @@ class Active(Formula):
     node: str
 
     def __str__(self) -> str:
-        return f"active({self.node})"
+        return f"active({_quoted(self.node)})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +80,7 @@ class Sent(Formula):
     when: Callable[[Any], object] | None = None
 
     def __str__(self) -> str:
-        return f"sent({self.port})" if self.when is None else f"sent({self.port}, {_named(self.when)})"
+        return f"sent({_quoted(self.port)}" + (")" if self.when is None else f", {_named(self.when)})")
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +90,7 @@ class Fired(Formula):
     node: str
 
     def __str__(self) -> str:
-        return f"fired({self.node})"
+        return f"fired({_quoted(self.node)})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +119,7 @@ class And(Formula):
         return (self.one, self.other)
 
     def __str__(self) -> str:
-        return f"({self.one} & {self.other})"
+        return f"({_first(self)} & {self.other})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +134,7 @@ class Or(Formula):
         return (self.one, self.other)
 
     def __str__(self) -> str:
-        return f"({self.one} | {self.other})"
+        return f"({_first(self)} | {self.other})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +148,7 @@ class Previously(Formula):
         return (self.of,)
 
     def __str__(self) -> str:
-        return f"previously({self.of})"
+        return f"previously({unbracketed(self.of)})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,9 +165,13 @@ class Since(Formula):
         return (self.began,) if self.holds is None else (self.holds, self.began)
 
     def __str__(self) -> str:
-        said = "" if self.at_least_s == 0 else f", at_least_s={self.at_least_s:g}"
-        said += "" if self.within_s == math.inf else f", within_s={self.within_s:g}"
-        return f"once({self.began}{said})" if self.holds is None else f"since({self.holds}, {self.began}{said})"
+        said = "" if self.at_least_s == 0 else f", at_least_s={plain_number(self.at_least_s)}"
+        said += "" if self.within_s == math.inf else f", within_s={plain_number(self.within_s)}"
+        return (
+            f"once({unbracketed(self.began)}{said})"
+            if self.holds is None
+            else f"since({unbracketed(self.holds)}, {unbracketed(self.began)}{said})"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +187,8 @@ class Times(Formula):
         return (self.of,)
 
     def __str__(self) -> str:
-        return f"at_least({self.number}, {self.of}, within_s={self.within_s:g})"
+        said = "" if self.within_s == math.inf else f", within_s={plain_number(self.within_s)}"
+        return f"at_least({self.number}, {unbracketed(self.of)}{said})"
 
 
 def active(node: Any) -> Formula:
@@ -202,13 +200,16 @@ def active(node: Any) -> Formula:
     return Active(_path(node, "active", "a node"))
 
 
-def sent(port: Any, when: Callable[[Any], object] | None = None) -> Formula:
+def sent(port: Any, when: Callable[[Any], object] | str | None = None) -> Formula:
     """A value passes a port now: an output sends it, an event is triggered with it, a slot or input is given it.
 
     Args:
       port: the port, or its path, such as "camera.image".
-      when: a condition for the value; by default any value will do. Markers (NO_MESSAGE, END) are not values.
+      when: a condition for the value, as a function or as text, "value > 3"; by default any value will do. Markers
+        (NO_MESSAGE, END) are not values.
     """
+    if isinstance(when, str):
+        when = parse_condition(when)
     if when is not None and not callable(when):
         raise UsageError(f"sent({port!r}, ...) takes a condition, such as lambda value: value > 3, got {when!r}")
     return Sent(_path(port, "sent", "a port"), when)
@@ -295,6 +296,29 @@ def _place(given: Any) -> Any:
         return None
 
 
+def _first(joined: And | Or) -> str:
+    """Return the text of what stands before the last sign; a chain needs one pair of brackets."""
+    return unbracketed(joined.one) if isinstance(joined.one, type(joined)) else str(joined.one)
+
+
+def unbracketed(formula: Formula) -> str:
+    """Return the text of a formula where a comma or the bracket of a function ends it."""
+    text = str(formula)
+    return text[1:-1] if isinstance(formula, And | Or) else text
+
+
+def _quoted(path: str) -> str:
+    return path if _PLAIN.fullmatch(path) else json.dumps(path, ensure_ascii=False)
+
+
+def plain_number(value: float) -> str:
+    """Return the shortest text of a number that means exactly this number."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)
+
+
 def _named(function: Callable[..., object]) -> str:
+    if isinstance(function, Condition):
+        return str(function)
     name = getattr(function, "__name__", "")
     return "..." if name in ("", "<lambda>") else name

@@ -8,24 +8,13 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 from hfg.errors import UsageError
 from hfg.monitors.compiling import Atom, Step, compiled
-from hfg.monitors.formulas import Formula, need_formula, once
-
-__all__ = [
-    "Judge",
-    "Property",
-    "Verdict",
-    "always",
-    "eventually",
-    "leads_to",
-    "never",
-    "precedes",
-    "until",
-]
+from hfg.monitors.formulas import Formula, atoms_of, need_formula, once, plain_number, unbracketed
 
 
 class Verdict(enum.Enum):
@@ -49,23 +38,54 @@ class Property:
     """What is to hold of a run.
 
     Attributes:
-      said: it in the words of the functions that made it.
-      asks: the formula that holds where something must follow; for `always` the formula itself.
-      answer: the formula that must hold then; None for `always`.
-      within_s: how long that may take.
-      meanwhile: what must hold until then, or None.
-      from_start: what is asked for is asked once, at the start of the run.
+      maker: the function that made it, such as "never".
+      given: the formulas that it was given.
+      within_s: how long the answer may take, if the function takes that.
     """
 
-    said: str
-    asks: Formula | None
-    answer: Formula | None = None
+    maker: str
+    given: tuple[Formula, ...]
     within_s: float = math.inf
-    meanwhile: Formula | None = None
-    from_start: bool = False
 
     def __str__(self) -> str:
-        return self.said
+        said = "" if self.within_s == math.inf else f", within_s={plain_number(self.within_s)}"
+        return f"{self.maker}({', '.join(map(unbracketed, self.given))}{said})"
+
+    @property
+    def asks(self) -> Formula | None:
+        """The formula that holds where something must follow; where nothing has to follow, what must always hold."""
+        match self.maker, self.given:
+            case "never", (formula,):
+                return ~formula
+            case "precedes", (first, then):
+                return then.implies(once(first))
+            case "always" | "leads_to", (formula, *_):
+                return formula
+        return None
+
+    @property
+    def answer(self) -> Formula | None:
+        """The formula that must hold then; None if nothing has to follow."""
+        return self.given[-1] if self.maker in ("leads_to", "eventually", "until") else None
+
+    @property
+    def meanwhile(self) -> Formula | None:
+        """The formula that must hold until then, or None."""
+        return self.given[0] if self.maker == "until" else None
+
+    @property
+    def from_start(self) -> bool:
+        """Whether what is asked for is asked once, at the start of the run."""
+        return self.maker in ("eventually", "until")
+
+    def atoms(self) -> Iterator[Atom]:
+        """Yield what it names, each as often as it is named."""
+        for formula in self.given:
+            yield from atoms_of(formula)
+
+    def moved(self, to: Callable[[str], str]) -> Property:
+        """Return the same property about other paths: `to` gives that of each."""
+        return replace(self, given=tuple(formula.moved(to) for formula in self.given))
 
     def judge(self, start: float) -> Judge:
         """Return what judges a run that starts at this time."""
@@ -76,39 +96,36 @@ class Property:
 
 def always(formula: Formula) -> Property:
     """It holds at every point."""
-    return Property(f"always({formula})", need_formula(formula, "always"))
+    return _made("always", formula)
 
 
 def never(formula: Formula) -> Property:
     """It holds at no point."""
-    return Property(f"never({formula})", ~need_formula(formula, "never"))
+    return _made("never", formula)
 
 
 def precedes(first: Formula, then: Formula) -> Property:
     """Whenever `then` holds, `first` holds or held before."""
-    need_formula(first, "precedes")
-    return Property(f"precedes({first}, {then})", need_formula(then, "precedes").implies(once(first)))
+    return _made("precedes", first, then)
 
 
 def leads_to(formula: Formula, answer: Formula, *, within_s: float = math.inf) -> Property:
     """Whenever the formula holds, the answer holds at that point or at most `within_s` seconds later."""
-    asks, comes = need_formula(formula, "leads_to"), need_formula(answer, "leads_to")
-    seconds = _seconds(within_s, "leads_to")
-    return Property(f"leads_to({asks}, {comes}{_said(seconds)})", asks, comes, seconds)
+    return _made("leads_to", formula, answer, within_s=within_s)
 
 
 def eventually(formula: Formula, *, within_s: float = math.inf) -> Property:
     """It holds at some point, at most `within_s` seconds after the start of the run."""
-    comes = need_formula(formula, "eventually")
-    seconds = _seconds(within_s, "eventually")
-    return Property(f"eventually({comes}{_said(seconds)})", None, comes, seconds, from_start=True)
+    return _made("eventually", formula, within_s=within_s)
 
 
 def until(holds: Formula, comes: Formula, *, within_s: float = math.inf) -> Property:
     """`comes` holds at some point, within these seconds from the start, and `holds` holds at every earlier point."""
-    first, then = need_formula(holds, "until"), need_formula(comes, "until")
-    seconds = _seconds(within_s, "until")
-    return Property(f"until({first}, {then}{_said(seconds)})", None, then, seconds, first, from_start=True)
+    return _made("until", holds, comes, within_s=within_s)
+
+
+def _made(maker: str, *given: Formula, within_s: float = math.inf) -> Property:
+    return Property(maker, tuple(need_formula(one, maker) for one in given), _seconds(within_s, maker))
 
 
 class Judge:
@@ -208,10 +225,6 @@ class _Response(Judge):
         if violated:
             self._is_open = False
         return violated
-
-
-def _said(within_s: float) -> str:
-    return "" if within_s == math.inf else f", within_s={within_s:g}"
 
 
 def _seconds(within_s: Any, what: str) -> float:

@@ -22,10 +22,9 @@ from hfg.monitors.formulas import Active, Fired, Sent
 from hfg.monitors.properties import Judge, Property, Verdict
 from hfg.trace import ActivityChanged, RunEnded, StructureChanged, TraceEvent
 
-__all__ = ["Monitors", "Seen", "Violation", "watch"]
-
 _LOGGER = Log("hfg.monitors")
 _STRETCH: Final = 32
+_MOST: Final = 100  # violations of a monitor that are kept; the others are counted
 _JUST_AFTER_S: Final = 1e-9  # what comes at the moment of a deadline is in time
 _KEPT: Final = frozenset({bool, int, float, str, type(None)})  # of others, which may be large, only the type
 
@@ -76,20 +75,22 @@ class Monitors:
     """The monitors of one run.
 
     Attributes:
-      violations: each time at which a property has ceased to hold, in order.
+      violations: each time at which a property has ceased to hold, in order; of each monitor the first 100.
+      counts: how often each was violated, by the name of its monitor.
       broken: by monitor, the error of a condition that raised; such a monitor judges nothing more.
       now: returns the time on the run's clock.
     """
 
-    def __init__(self, run: Run, properties: Mapping[str, Property], on_violation: OnViolation) -> None:
+    def __init__(self, run: Run) -> None:
         self.violations: list[Violation] = []
+        self.counts: dict[str, int] = {}
         self.broken: dict[str, Exception] = {}
         self._run = run
         self._engine = run._engine
-        self._on_violation = on_violation
         self.now = self._engine.now if self._engine.time.epoch is None else _clock(self._engine.time.epoch)
         self._began = self.now()
-        self._watches = {name: _Watch(self, name, what, self._began) for name, what in properties.items()}
+        self._watches: dict[str, _Watch] = {}
+        self._errors: dict[str, MonitorViolated] = {}
         self._timer: Any = None
         self._alarm = math.inf
         self._boxes: frozenset[str] = frozenset()
@@ -110,22 +111,35 @@ class Monitors:
                 f'monitor "{name}" has judged nothing since its condition raised {error!r}'
             ) from error
         if self.violations:
-            more = len(self.violations) - 1
+            more = sum(self.counts.values()) - 1
             raise MonitorViolated(f"{self.violations[0]}" + (f"\n(and {more} more)" if more else ""))
 
     # --- where they listen ------------------------------------------------------------------------------------------
 
     def _listen(self) -> None:
-        parts = self._run._parts
-        listening = [(one, port, look) for one in self._watches.values() for port, look in one.looks()]
-        for one, port, look in listening:
-            what = self._port(port) if isinstance(port, str) else port
-            one.ends.append(parts.taps.look(what, _Looker(look)))
-        self._find_boxes()
-        for one in self._watches.values():
-            one.learn(set(self._run.active()) - self._boxes)
         self._run.trace(self._changed, changes_only=True)
+
+    def _add(self, properties: Mapping[str, Property], on_violation: OnViolation) -> None:
+        """Judge these, too, from now on; all of them, or none if one is refused."""
+        self._find_boxes()
+        now = self.now()
+        added = [_Watch(self, name, what, now, on_violation) for name, what in properties.items()]
+        looks = [
+            (one, self._port(port) if isinstance(port, str) else port, look)
+            for one in added
+            for port, look in one.looks()
+        ]
+        for one, port, look in looks:
+            one.ends.append(self._run._parts.taps.look(port, _Looker(look)))
+        for one in added:
+            one.learn(set(self._run.active()) - self._boxes)
+            self._watches[one.name] = one
         self._plan()
+
+    def _remove(self, name: str) -> None:
+        """Judge one no more."""
+        self._watches.pop(name).give_up()
+        self.counts.pop(name, None)  # one of this name that comes later says its own
 
     def _port(self, path: str) -> Any:
         found = self._run.graph[path]
@@ -185,12 +199,26 @@ class Monitors:
     def _violated(self, one: _Watch, t: float) -> None:
         stretch = tuple(Seen(at - self._began, what, value) for at, what, value in one.ring)
         violation = Violation(one.name, str(one.what), t - self._began, stretch)
-        self.violations.append(violation)
-        _LOGGER.warning("%s", violation)
-        if self._on_violation == "fail":
+        count = self.counts[one.name] = self.counts.get(one.name, 0) + 1
+        if count <= _MOST:
+            self.violations.append(violation)
+            _LOGGER.warning("%s", violation)
+        if one.on_violation == "fail":
             self._engine.finish("failed", MonitorViolated(str(violation)))
-        elif callable(self._on_violation):
-            self._on_violation(violation)
+            return
+        self._report(violation, count)
+        if callable(one.on_violation):
+            one.on_violation(violation)
+
+    def _report(self, violation: Violation, count: int) -> None:
+        """Let the report of the run have the first violation of a monitor, and how many there were."""
+        if count == 1:
+            self._errors[violation.monitor] = MonitorViolated(str(violation))
+            self._engine.core.errors.append(self._errors[violation.monitor])
+        else:
+            error = self._errors[violation.monitor]
+            first = next(one for one in self.violations if one.monitor == violation.monitor)
+            error.args = (f"{first}\n(and {count - 1:,} more of this monitor)",)
 
     def _break(self, one: _Watch, error: Exception) -> None:
         self.broken[one.name] = error
@@ -216,9 +244,10 @@ class _Looker:
 class _Watch:
     """One monitor: its judge, the truth of each atom at present, and the last points."""
 
-    def __init__(self, monitors: Monitors, name: str, what: Property, began: float) -> None:
+    def __init__(self, monitors: Monitors, name: str, what: Property, began: float, on_violation: OnViolation) -> None:
         self.name = name
         self.what = what
+        self.on_violation = on_violation
         self.judge: Judge = what.judge(began)
         self.ring: deque[tuple[float, str, object]] = deque(maxlen=_STRETCH)
         self.ends: list[Callable[[], None]] = []
@@ -349,6 +378,7 @@ def watch(run: Run, *, on_violation: OnViolation = "note", **properties: Propert
             )
     if on_violation not in ("note", "fail") and not callable(on_violation):
         raise UsageError(f'on_violation is "note", "fail" or a function that takes a Violation, got {on_violation!r}')
-    monitors = Monitors(run, properties, on_violation)
+    monitors = Monitors(run)
+    monitors._add(properties, on_violation)
     monitors._listen()
     return monitors

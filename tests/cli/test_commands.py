@@ -91,6 +91,30 @@ def test_explain_tells_why_a_node_is_not_fused(hfg: Command) -> None:
     assert "nodes are fused after" in " ".join(shown.err.split())
 
 
+def test_a_violated_monitor_is_shown_and_exit_status_1(hfg: Command) -> None:
+    shown = hfg("run", TARGET, *VIRTUAL, "--monitor", "few=never(sent(numbers.out, value == 1))")
+    assert shown.code == 1
+    assert 'monitor "few" is violated after' in shown.err
+
+
+def test_a_monitor_that_holds_changes_nothing(hfg: Command) -> None:
+    shown = hfg("run", TARGET, *VIRTUAL, "--monitor", "always(sent(numbers.out, value < 9) | fired(half))")
+    assert (shown.code, shown.out) == (0, "half 0\nhalf 1\nhalf 2\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("never(sen(numbers.out))", 'monitor "monitor_1": line 1, column 7: a formula is expected, got "sen"'),
+        ("it=never(sent(number.out))", 'there is no "number.out"'),
+    ],
+)
+def test_a_monitor_that_cannot_judge_is_refused(hfg: Command, text: str, sentence: str) -> None:
+    shown = hfg("run", TARGET, *VIRTUAL, "--monitor", text)
+    assert shown.code != 0
+    assert sentence in " ".join(shown.err.split())
+
+
 def test_json_has_standard_output_for_itself(hfg: Command) -> None:
     shown = hfg("run", TARGET, *VIRTUAL, "--json")
     report = json.loads(shown.out)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from hfg.engine.runtime.settings import RunFields
-from hfg.graph import EdgeOptions, GroupSpec, NodeOptions
+from hfg.graph import EdgeOptions, GroupSpec, MonitorSpec, NodeOptions
 from hfg.graph.structure.option import Fields, declared
 
 PAGE: Final = Path(__file__).parents[2] / "docs" / "reference.md"
@@ -23,6 +23,7 @@ KINDS: Final[dict[str, type[Fields[Any]]]] = {
     "an edge": EdgeOptions,
     "a node": NodeOptions,
     "a group": GroupSpec,
+    "a monitor": MonitorSpec,
     "a run": RunFields,
 }
 

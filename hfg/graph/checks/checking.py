@@ -25,6 +25,7 @@ from hfg.graph.checks.flow import (
     waiting_rings,
 )
 from hfg.graph.checks.ledgers import kept_groups
+from hfg.graph.checks.monitors import monitors
 from hfg.graph.checks.nodes import (
     async_in_threads,
     concurrent_firings,
@@ -63,7 +64,15 @@ _OF_EACH_LEVEL: Final[list[Check]] = [
     unfed_slots,
     waiting_rings,
 ]
-_OF_THE_WHOLE: Final[list[Check]] = [unused_scheduling, names, promotions, changed_inputs, process_borders, kept_groups]
+_OF_THE_WHOLE: Final[list[Check]] = [
+    unused_scheduling,
+    names,
+    promotions,
+    changed_inputs,
+    process_borders,
+    kept_groups,
+    monitors,
+]
 
 
 def also(check: Check) -> Check:

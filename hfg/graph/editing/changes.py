@@ -7,7 +7,7 @@ made, so it cannot fail half-way. A run reads the changes, too, to see which edg
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -18,9 +18,9 @@ from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.facts import Fact, swap_in_facts
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.groups import Groups, GroupsState
-from hfg.graph.structure.level import Level, inside, level_of
+from hfg.graph.structure.level import Level, Whole, inside, level_of
 from hfg.graph.structure.membership import close_box, leave, open_box, place, set_options, settle, write_parameter
-from hfg.graph.structure.options import NodeOptions
+from hfg.graph.structure.options import MonitorSpec, NodeOptions
 from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort
 
@@ -281,6 +281,19 @@ class GroupsChange(Change):
     @override
     def do(self) -> None:
         self.groups.restore(self.after)
+
+
+@dataclass(eq=False)
+class MonitorsChange(Change):
+    """Other monitors are declared, or the same otherwise."""
+
+    whole: Whole
+    before: Mapping[str, MonitorSpec]
+    after: Mapping[str, MonitorSpec]
+
+    @override
+    def do(self) -> None:
+        self.whole.set_monitors(self.after)
 
 
 @dataclass(eq=False)

@@ -15,7 +15,15 @@ from typing_extensions import override
 from hfg.graph.editing.command import Command, decode, encode, read
 from hfg.graph.structure.facts import Claim
 from hfg.graph.structure.option import add_unset
-from hfg.graph.structure.options import EdgeFields, EdgeGiven, GroupFields, GroupGiven, NodeGiven
+from hfg.graph.structure.options import (
+    EdgeFields,
+    EdgeGiven,
+    GroupFields,
+    GroupGiven,
+    MonitorFields,
+    MonitorGiven,
+    NodeGiven,
+)
 
 __all__ = [
     "Add",
@@ -42,9 +50,11 @@ __all__ = [
     "Promote",
     "Remove",
     "RemoveGroup",
+    "RemoveMonitor",
     "Rename",
     "Replace",
     "SetEdge",
+    "SetMonitor",
     "SetParameter",
     "Ungate",
     "decode",
@@ -148,6 +158,27 @@ class ChangeGroup(Command, frozen=True):
 
 class RemoveGroup(Command, frozen=True):
     """Take a group away in which no node runs."""
+
+    name: str
+
+
+class SetMonitor(Command, MonitorFields, frozen=True):  # type: ignore[misc]  # nobody changes it
+    """Declare what must hold of each run, as `graph.monitor` does, or declare it otherwise.
+
+    Attributes:
+      name: for people.
+      property: as text, "never(active(driving))".
+    """
+
+    name: str
+    property: str
+    if TYPE_CHECKING:
+
+        def __init__(self, name: str, property: str, **options: Unpack[MonitorGiven]) -> None: ...  # noqa: A002
+
+
+class RemoveMonitor(Command, frozen=True):
+    """Take a monitor away."""
 
     name: str
 

@@ -61,7 +61,7 @@ def _key(command: c.Command) -> tuple[Any, ...]:
             return "enabled", path
         case c.Fact(claim=claim, nodes=nodes):
             return "fact", f"{claim}: {sorted(nodes)}"
-        case c.AddGroup(name=name) | c.AddInput(name=name) | c.AddOutput(name=name):
+        case c.AddGroup(name=name) | c.SetMonitor(name=name) | c.AddInput(name=name) | c.AddOutput(name=name):
             return type(command).__name__, name
     return type(command).__name__, getattr(command, "path", "")
 

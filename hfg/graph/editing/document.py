@@ -2,6 +2,7 @@
 
     Document            a whole graph, or a subgraph that other files include
     ├── groups          GroupDocument by name
+    ├── monitors        MonitorDocument by name
     ├── nodes           NodeDocument by name; may contain a BoxDocument, its inner graph, and a GateDocument, or
     │                   InsideDocuments about the inner graph that its type has built
     └── edges           EdgeDocument in order, with OperatorDocuments
@@ -21,7 +22,7 @@ import msgspec
 from hfg.graph.editing.commands import EdgeSaid, Operator
 from hfg.graph.structure.facts import Claim
 from hfg.graph.structure.option import declared
-from hfg.graph.structure.options import EdgeGiven, GroupFields, NodeFields
+from hfg.graph.structure.options import EdgeGiven, GroupFields, MonitorFields, NodeFields
 
 VERSION: Final = 1
 PORT_KINDS: Final = ("inputs", "outputs", "events", "slots")
@@ -76,6 +77,16 @@ class GroupDocument(GroupFields, omit_defaults=True, kw_only=True):
     """Where nodes run (rules R1, R2)."""
 
     threads: int = 1
+
+
+class MonitorDocument(MonitorFields, omit_defaults=True, kw_only=True):
+    """A property that must hold of each run; in a file only its text if it has no options.
+
+    Attributes:
+      property: as text, such as never(active(driving) & sent(drive.lamp, value == true)).
+    """
+
+    property: str
 
 
 class ParameterDocument(msgspec.Struct, omit_defaults=True):
@@ -191,6 +202,7 @@ class Document(BoxDocument, omit_defaults=True):
       notes: about the whole, by name.
       groups: where nodes run, by name.
       facts: what is stated about activity.
+      monitors: what must hold of each run, by name.
     """
 
     hfg: int = VERSION
@@ -198,6 +210,7 @@ class Document(BoxDocument, omit_defaults=True):
     notes: dict[str, Any] = {}
     groups: dict[str, GroupDocument] = {}
     facts: list[FactDocument] = []
+    monitors: dict[str, MonitorDocument] = {}
 
 
 NODE_OPTIONS: Final = tuple(declared(NodeFields))

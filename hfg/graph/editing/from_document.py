@@ -97,6 +97,7 @@ class Builder:
         with self.root.whole.taking_commands(), raise_refusals():
             if isinstance(document, Document):
                 self._declare_groups(document)
+                self._declare_monitors(document)
             if self.root.owner is None:
                 self._declare_ports(document)
                 if isinstance(document, Document):
@@ -137,6 +138,12 @@ class Builder:
                 self.steps.declare_group(name, said)
                 if known.by_name[name] != before:
                     self.record(c.AddGroup(name, **said))
+
+    def _declare_monitors(self, document: Document) -> None:
+        for name, said in document.monitors.items():
+            with self.refusing(("monitors", name), f'monitor "{name}"'):
+                self.steps.declare_monitor(name, said.property, said.said())
+                self.record(c.SetMonitor(name, said.property, **said.said()))
 
     def _declare_ports(self, document: BoxDocument) -> None:
         for name, text in document.inputs.items():

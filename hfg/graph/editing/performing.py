@@ -5,7 +5,7 @@ Resolves the paths in commands; `steps` does the work. A running graph is edited
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -25,10 +25,12 @@ from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd
 from hfg.graph.structure.facts import Fact
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level, level_of, nodes_within
+from hfg.graph.structure.monitors import moved_monitor
 from hfg.graph.structure.naming import need_name, suggest
 from hfg.graph.structure.option import given
 from hfg.graph.structure.options import PLAIN, EdgeOptions, GroupGiven, GroupSpec
 from hfg.graph.structure.paths import level_and_name, node_at, parameter_at, source_at, target_at
+from hfg.nodetypes.node import Node
 
 
 def perform(level: Level, commands: Sequence[c.Command]) -> list[Change]:
@@ -65,7 +67,22 @@ class _Interpreter:
                 f"an edit takes commands, got {command!r}; write one, as in hfg.commands.Connect('a.out', 'b.value')"
             )
         _refuse_malformed(command)
-        method(command)
+        if isinstance(command, c.Rename | c.Enclose | c.Dissolve) and self.root.whole.monitors:
+            before = {node.place.path: node for level in self.root.walk() for node in level.nodes.values()}
+            method(command)
+            self._move_monitors(before)
+        else:
+            method(command)
+
+    def _move_monitors(self, before: Mapping[str, Node]) -> None:
+        """Let monitors name the same nodes as before: by the paths that these have now."""
+
+        def now(path: str) -> str:
+            node = before.get(path)
+            return path if node is None or node._place is None else node.place.path
+
+        monitors = self.root.whole.monitors
+        self.steps.set_monitors({name: moved_monitor(spec, now) for name, spec in monitors.items()})
 
     def check_replaced(self) -> None:
         """Check the edges of replaced nodes, now that the nodes at both ends are final."""
@@ -173,6 +190,15 @@ class _Interpreter:
         if name not in known:
             raise GraphError(f'there is no group "{name}"; {suggest(str(name), known)}')
         return known[name]
+
+    def _setmonitor(self, command: c.SetMonitor) -> None:
+        self.steps.declare_monitor(command.name, command.property, command.said())
+
+    def _removemonitor(self, command: c.RemoveMonitor) -> None:
+        known = self.root.whole.monitors
+        if command.name not in known:
+            raise GraphError(f'there is no monitor "{command.name}"; {suggest(command.name, known)}')
+        self.steps.set_monitors({name: spec for name, spec in known.items() if name != command.name})
 
     def _addinput(self, command: c.AddInput) -> None:
         self.steps.declare_port("input", command.name, command.type)

@@ -6,7 +6,7 @@ one way to build a graph from data. Depends on `changes` and `structure`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Any, Literal, TypeAlias, Unpack
 
@@ -23,6 +23,7 @@ from hfg.graph.editing.changes import (
     FactChange,
     GateChange,
     GroupsChange,
+    MonitorsChange,
     NodeChange,
     NotesChange,
     OptionsChange,
@@ -43,7 +44,8 @@ from hfg.graph.structure.facts import Fact, facts_of, refuse_fact
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.given import edge_options, group_spec
 from hfg.graph.structure.level import Level, inside, level_of, nodes_within
-from hfg.graph.structure.options import EdgeGiven, GroupGiven, NodeGiven
+from hfg.graph.structure.monitors import monitor_spec
+from hfg.graph.structure.options import EdgeGiven, GroupGiven, MonitorGiven, MonitorSpec, NodeGiven
 from hfg.graph.structure.places import side_of
 from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort
@@ -264,6 +266,16 @@ class Steps:
         before = groups.state()
         groups.change(group_spec(name, said))
         self.changes.append(GroupsChange(groups, before, groups.state()))
+
+    def set_monitors(self, after: Mapping[str, MonitorSpec]) -> None:
+        """Declare other monitors, if that changes anything."""
+        before = self.root.whole.monitors
+        if after != before:
+            self.do(MonitorsChange(self.root.whole, before, after))
+
+    def declare_monitor(self, name: str, property_: object, said: MonitorGiven) -> None:
+        """Declare a monitor, or declare it otherwise."""
+        self.set_monitors({**self.root.whole.monitors, name: monitor_spec(name, property_, said)})
 
     def declare_port(self, kind: Literal["input", "output"], name: str, type_: str) -> None:
         """Declare a port of the whole graph; its type is a string."""

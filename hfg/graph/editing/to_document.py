@@ -27,6 +27,7 @@ from hfg.graph.editing.document import (
     GateDocument,
     GroupDocument,
     InsideDocument,
+    MonitorDocument,
     NodeDocument,
 )
 from hfg.graph.editing.type_texts import text_of_type
@@ -35,9 +36,11 @@ from hfg.graph.structure.edge import Edge, SourceEnd, end_path, is_feed
 from hfg.graph.structure.facts import facts_of
 from hfg.graph.structure.level import Level, Whole, inside, level_of
 from hfg.graph.structure.operators import NamedOperator
-from hfg.graph.structure.options import EdgeGiven, GroupGiven, GroupSpec
+from hfg.graph.structure.options import EdgeGiven, GroupGiven, GroupSpec, MonitorSpec
 from hfg.graph.structure.refusals import raise_refusals
 from hfg.graph.structure.subgraph import Box, is_box, is_unnamed
+from hfg.monitors.conditions import Condition
+from hfg.monitors.formulas import Sent
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, Port
 from hfg.ports.specs import REQUIRED
@@ -73,6 +76,8 @@ class Describer:
         for spec in root.whole.groups.by_name.values():
             if spec != GroupSpec("loop"):
                 document.groups[spec.name] = _group(spec)
+        for name, monitor in root.whole.monitors.items():
+            document.monitors[name] = self._monitor(monitor)
         for name, port in root.ports.inputs.items():
             document.inputs[name] = self._type(port.type, f'input "{name}"', " of the graph")
         for name, out in root.ports.outputs.items():
@@ -87,6 +92,13 @@ class Describer:
             for name, ports in level.promotions.by_name.items():
                 box.promotes[name] = [f"{port.node.place.name}.{port.name}" for port in ports]
         return document
+
+    def _monitor(self, spec: MonitorSpec) -> MonitorDocument:
+        for atom in spec.property.atoms():
+            if isinstance(atom, Sent) and not isinstance(atom.when, Condition | None):
+                sentence = f'its condition at "{atom.port}" is code; write it as text, as in sent(port, "value > 3")'
+                self.wrong(f'monitor "{spec.name}"', f'monitor "{spec.name}"', sentence)
+        return MonitorDocument(property=str(spec.property), **spec.said())
 
     def _type(self, hint: object, path: str, where: str = "") -> str:
         text = text_of_type(hint)

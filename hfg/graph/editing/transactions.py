@@ -28,6 +28,7 @@ from hfg.graph.editing.commands import (
     Promote,
     Replace,
     SetEdge,
+    SetMonitor,
     SetParameter,
 )
 from hfg.graph.editing.performing import perform
@@ -36,7 +37,7 @@ from hfg.graph.flat import flatten
 from hfg.graph.structure.history import History
 from hfg.graph.structure.level import HasLevel, level_of
 
-_MAY_BREAK = (Add, ChangeGroup, Connect, Copy, Dissolve, Enclose, Move, Promote, Replace, SetEdge)
+_MAY_BREAK = (Add, ChangeGroup, Connect, Copy, Dissolve, Enclose, Move, Promote, Replace, SetEdge, SetMonitor)
 """Commands after which something may be wrong that only the whole shows."""
 
 

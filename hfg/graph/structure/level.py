@@ -6,7 +6,7 @@ who adds, connects or edits has done that. Depends on the tables of members, con
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Protocol
 
@@ -19,6 +19,7 @@ from hfg.graph.structure.groups import Groups
 from hfg.graph.structure.history import History
 from hfg.graph.structure.members import Members
 from hfg.graph.structure.naming import path_of
+from hfg.graph.structure.options import MonitorSpec
 from hfg.graph.structure.promotions import Promotions
 from hfg.graph.structure.subgraph import Box
 from hfg.nodetypes.node import Node
@@ -186,6 +187,8 @@ class Whole:
       takes_commands: commands are being carried out, which a run follows and the history knows.
       facts: what users state about activity; those of removed nodes stay, because an undo brings the nodes back.
       notes: of editors, by node; None: those about the whole. Nothing else reads them, and they go with their node.
+      monitors: what must hold of each run, by name; replaced as a whole.
+      on_monitors: called when they have changed; set by the code that judges the run.
       history: of edits; only the code that edits interprets its objects.
     """
 
@@ -196,7 +199,9 @@ class Whole:
         "groups",
         "history",
         "make_face",
+        "monitors",
         "notes",
+        "on_monitors",
         "root",
         "run",
         "takes_commands",
@@ -213,17 +218,26 @@ class Whole:
         self.run: object | None = None
         self.takes_commands = False
         self.notes: dict[Node | None, dict[str, Any]] = {}
+        self.monitors: Mapping[str, MonitorSpec] = {}
+        self.on_monitors: Callable[[], None] | None = None
         self.history: History[Any] = History(lambda: self.root.title)
 
     def begin_run(self, run: object) -> None:
-        """From now on only commands change the structure. A debug run also checks the facts that are stated."""
+        """From now on only commands change the structure. Monitors judge; a debug run also checks facts."""
         self.run = run
+        hooks.monitor(run, self)
         if self.facts:
             hooks.watch_facts(run)
 
     def end_run(self) -> None:
         """It may be changed by hand again."""
-        self.run = None
+        self.run = self.on_monitors = None
+
+    def set_monitors(self, monitors: Mapping[str, MonitorSpec]) -> None:
+        """Let other monitors judge."""
+        self.monitors = monitors
+        if self.on_monitors is not None:
+            self.on_monitors()
 
     @contextmanager
     def taking_commands(self) -> Iterator[None]:

@@ -1,4 +1,4 @@
-"""The options of edges, nodes and groups. This is the place to add one; for a run, see `engine.runtime.settings`.
+"""The options of edges, nodes, groups and monitors. Add one here; for a run, see `engine.runtime.settings`.
 
 Each is declared once, as a field with an `Option`: its type, default, limits, unit, meaning, who may have it and how a
 drawing shows it. The arguments of a call are declared above it for type checkers, by name and type. Everything else is
@@ -19,8 +19,10 @@ import msgspec
 from typing_extensions import TypeVar
 
 from hfg.graph.structure.option import Fields, Option, documented
+from hfg.monitors.properties import Property
 
 Errors: TypeAlias = Iterable[type[Exception] | str] | type[Exception] | str
+OnViolation: TypeAlias = Literal["note", "fail"]
 OnError: TypeAlias = Literal["stop", "skip", "disable", "restart"]
 Release: TypeAlias = Literal["auto", "sequential", "pipelined"]
 Overflow: TypeAlias = Literal["wait", "drop_oldest", "drop_newest", "latest", "error"]
@@ -327,6 +329,40 @@ class GroupSpec(GroupFields, frozen=True):  # type: ignore[misc]
     """Where nodes run, and which of them comes first (rules R1, R2), checked."""
 
     name: str
+
+
+# --- monitors ---
+
+
+class MonitorGiven(TypedDict, total=False):
+    """The options of a monitor."""
+
+    on_violation: OnViolation
+    triggers: str
+
+
+class MonitorFields(Fields[MonitorGiven], kw_only=True):
+    """The reaction to a violation that a monitor finds."""
+
+    on_violation: Annotated[
+        OnViolation, Option('Whether a violation is only noted, or ends the run as failed ("fail").')
+    ] = "note"
+    triggers: Annotated[
+        str,
+        Option(
+            "The slot or event that a violation triggers, by its path from the whole graph. Its value is the text of "
+            "the violation, where a text fits its type.",
+            expects='the path of a slot or event, "drive.halt"',
+        ),
+    ] = ""
+
+
+@documented
+class MonitorSpec(MonitorFields, frozen=True):  # type: ignore[misc]
+    """A property that must hold of each run of a graph, checked."""
+
+    name: str
+    property: Property
 
 
 PLAIN: Final = EdgeOptions()

@@ -1,0 +1,90 @@
+"""Judges a run by the monitors that its graph declares; they follow edits. Depends on `watching`."""
+
+from __future__ import annotations
+
+import asyncio
+from functools import partial
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from hfg.base.logs import Log
+from hfg.engine import Run
+from hfg.errors import HfgError, UsageError
+from hfg.graph.structure.level import Whole
+from hfg.graph.structure.monitors import node_part
+from hfg.graph.structure.options import MonitorSpec
+from hfg.monitors.formulas import Sent
+from hfg.monitors.watching import Monitors, Violation
+from hfg.types import accepts
+
+_LOGGER = Log("hfg.monitors")
+_judging: WeakKeyDictionary[Run, _Declared] = WeakKeyDictionary()
+
+
+def declared(run: Run) -> Monitors:
+    """Return what the monitors have found that the graph of a run declares; in this process.
+
+    Raises:
+      UsageError: its graph declares none.
+    """
+    judging = _judging.get(run)
+    if judging is None:
+        raise UsageError(
+            f'graph "{run.graph.name}" declares no monitor: write graph.monitor("dark", monitors.never(...)), or call '
+            "monitors.watch(run, dark=...)"
+        )
+    return judging.monitors
+
+
+def judge(run: Run, whole: Whole) -> None:
+    """Begin to judge a run, and follow edits; see `Whole.begin_run`."""
+    judging = _judging[run] = _Declared(run, whole)
+    whole.on_monitors = judging.follow
+    judging.follow()
+
+
+class _Declared:
+    """The monitors of a graph in one run."""
+
+    def __init__(self, run: Run, whole: Whole) -> None:
+        self.monitors = Monitors(run)
+        self.monitors._listen()
+        self._run = run
+        self._whole = whole
+        self._specs: dict[str, MonitorSpec] = {}
+        self._sending: set[asyncio.Task[None]] = set()
+
+    def follow(self) -> None:
+        """Judge by what is declared now. A changed monitor starts over."""
+        wanted = {name: spec for name, spec in self._whole.monitors.items() if self._is_here(spec)}
+        for name, spec in list(self._specs.items()):
+            if wanted.get(name) != spec:
+                self.monitors._remove(name)
+                del self._specs[name]
+        for name, spec in wanted.items():
+            if name not in self._specs:
+                act = partial(self._trigger, spec.triggers) if spec.triggers else spec.on_violation
+                self.monitors._add({name: spec.property}, act)
+                self._specs[name] = spec
+
+    def _is_here(self, spec: MonitorSpec) -> bool:
+        """Return whether this process has the nodes that a monitor names; the check has refused those of several."""
+        here = {worker.path for worker in self._run._engine.core.workers if worker.node is not None}
+        paths = [node_part(one.port if isinstance(one, Sent) else one.node) for one in spec.property.atoms()]
+        return all(any(one == path or one.startswith(f"{path}/") for one in here) for path in paths if path)
+
+    def _trigger(self, path: str, violation: Violation) -> None:
+        """Trigger a slot or event. The run stays open until the signal is there."""
+        engine = self._run._engine
+        engine.quiet.hold()
+        task = asyncio.ensure_future(self._send(path, violation))
+        self._sending.add(task)
+        task.add_done_callback(self._sending.discard)
+        task.add_done_callback(lambda _: engine.quiet.unhold())
+
+    async def _send(self, path: str, violation: Violation) -> None:
+        try:
+            port: Any = self._run.graph[path]
+            await self._run.trigger(port, str(violation) if accepts("", port.type) else None)
+        except (HfgError, TypeError) as error:
+            _LOGGER.warning('monitor "%s" could not trigger "%s": %s', violation.monitor, path, error)
