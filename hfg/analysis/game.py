@@ -58,6 +58,7 @@ class Rule:
       gates: the nodes or subgraphs that have to be active.
       clears: a subgraph's bits, all of which go (rule G2).
       needs: the subgraph's bits of which one must be set.
+      after: edges from `start` whose tokens have to be taken first (rules A10, F9).
     """
 
     text: str
@@ -74,6 +75,7 @@ class Rule:
     gates: tuple[int, ...] = ()
     clears: int = 0
     needs: int = 0
+    after: tuple[int, ...] = ()
 
     @property
     def may_lose(self) -> bool:
@@ -136,6 +138,7 @@ class Game:
         for edge in flat.edges:
             if edge.target.kind == "slot":
                 self._slot_edges.setdefault(edge.target.node, []).append(edge)
+        self._first = self._find_first()
         self._gates = self._find_gates()
         self._fragile = self._find_fragile()
         self._ends = self._find_ending()
@@ -153,6 +156,25 @@ class Game:
             self._add_scope(scope.index)
 
     # --- making the rules
+
+    def _find_first(self) -> dict[int, tuple[int, ...]]:
+        """For each node the edges from `start` into its slots: nothing calls it before (rules A10, F9).
+
+        Only the hook `setup` may send earlier.
+        """
+        if any("setup" in node.node._type.hooks for node in self.flat.nodes):
+            return {}
+        found: dict[int, tuple[int, ...]] = {}
+        for number in self.start:
+            target = self.edges[number].target
+            if target.kind == "slot":
+                found[target.node] = (*found.get(target.node, ()), number)
+        return found
+
+    def _after(self, index: int, kind: Kind, take: int = -1) -> tuple[int, ...]:
+        """The edges from `start` that a step of a node comes after, if it is a call."""
+        is_call = self.edges[take].target.kind == "slot" if take >= 0 else kind in ("is called", "is set")
+        return () if not is_call or take in self.start else self._first.get(index, ())
 
     def _find_gates(self) -> dict[int, tuple[int, ...]]:
         found: dict[int, tuple[int, ...]] = {}
@@ -234,6 +256,7 @@ class Game:
                 keeps="active" if take >= 0 else "",
                 right=right,
                 gates=gates,
+                after=self._after(index, kind, take),
             )
 
     def _add_handler(self, node: FlatNode, name: str, handler: Handler, kind: Kind, *, gated: bool = False) -> None:
@@ -294,11 +317,15 @@ class Game:
         for number in self.into.get(index, ()):
             self._add_taking(node, number, code.slots)
         for edge in self._slot_edges.get(index, ()):
+            if edge.active and edge.source.node == ROOT and edge.source.name == "start":
+                continue  # it happens once, and brings activity
+            after = self._after(index, "is set")
             if edge.target.name == "activate":
-                self.rules.append(Rule(f'"{edge.label}" activates "{node.path}"', "is set", index, keeps="active"))
+                text = f'"{edge.label}" activates "{node.path}"'
+                self.rules.append(Rule(text, "is set", index, keeps="active", after=after))
             elif edge.target.name == "deactivate":
                 text = f'"{edge.label}" deactivates "{node.path}"'
-                self.rules.append(Rule(text, "is set", index, keeps="inactive"))
+                self.rules.append(Rule(text, "is set", index, keeps="inactive", after=after))
 
     def _add_automatic(self, node: FlatNode, ports: frozenset[str]) -> None:
         """Automatic events that carry activity on; each is a sending of its own (rule A9)."""
@@ -321,9 +348,12 @@ class Game:
         text = f'"{node.path}" takes the activity from "{edge.label}"'
         handler = slots.get(target.name) if target.kind == "slot" else None
         if target.kind == "slot" and target.name == "deactivate":
-            self.rules.append(Rule(f'"{edge.label}" ends in deactivate', "loses", node.index, number, keeps="inactive"))
+            after = self._after(node.index, "takes", number)
+            text = f'"{edge.label}" ends in deactivate'
+            self.rules.append(Rule(text, "loses", node.index, number, keeps="inactive", after=after))
         elif handler is None or not self._is_whole(node, handler):
-            self.rules.append(Rule(text, "takes", node.index, number, keeps="active"))
+            after = self._after(node.index, "takes", number)
+            self.rules.append(Rule(text, "takes", node.index, number, keeps="active", after=after))
         else:
             for bag in self._cases(node, handler):
                 kind: Kind = "is called" if bag else "takes"
@@ -435,6 +465,7 @@ class Play:
         for number in game.start:
             if bits.one[number] & self.mask:
                 self.first = self._put(self.first, number)
+        self._waits: dict[Rule, int] = {}
         self._open = {by: game.mask_of(by) for rule in game.rules for by in rule.gates}
         self._by_bit: dict[int, list[tuple[Rule, bool]]] = {}
         self._always: list[Rule] = []
@@ -453,12 +484,14 @@ class Play:
             known = all(self._open[by] and not self._open[by] & ~self.mask for by in rule.gates)
             gates = rule.gates if known else ()
             effect = (rule.gives, rule.makes, rule.takes_away, rule.keeps, rule.right, rule.clears)
-            key = (rule.actor, rule.take, rule.minus, rule.kind == "is set", effect)
+            key = (rule.actor, rule.take, rule.minus, rule.kind == "is set", rule.after, effect)
             if (key, gates) in seen or (key, ()) in seen:
                 continue
             seen.add((key, gates))
             rule = rule if gates == rule.gates else replace(rule, gates=gates)
             found.append(rule)
+            if rule.after:
+                self._waits[rule] = sum(self.game.bits.one[number] for number in rule.after)
             for bit, by_right in self._needs(rule):
                 if bit is None:
                     self._always.append(rule)
@@ -522,9 +555,13 @@ class Play:
     def _apply(self, rule: Rule, state: int, by: Literal["nobody", "right", "active"]) -> Iterator[tuple[Rule, int]]:
         """Apply a rule in the name of a sender that is not active, that has the right of A3, or that is active."""
         bits = self.game.bits
+        if rule.after and state & self._waits[rule]:
+            return
         for before in self._left(state, rule) if rule.take >= 0 else (state,):
             after = before & ~rule.clears
             me = 1 << bits.node[rule.actor] if rule.actor in bits.node else 0
+            if by == "nobody" and rule.makes and before & me:
+                continue  # an active sender makes none out of nothing (rule A4)
             if rule.keeps == "active":
                 after |= me
             elif rule.keeps == "inactive":

@@ -35,11 +35,13 @@ class ActivityReplay:
       most: how many of its nodes were active at once at most; activity in transit to one of them counts.
       least: how many at least, after the start of the run.
       active: the nodes that are active at the end, by their paths in the graph.
+      unknown: why the claim was not broken in this replay, and so may or may not be in a run; "" if it was broken.
     """
 
     most: int
     least: int
     active: tuple[str, ...]
+    unknown: str = ""
 
 
 def replay_activity(graph: Graph, verdict: Verdict) -> ActivityReplay:
@@ -159,7 +161,21 @@ class _Puppets:
                 counted.rest()
             paths = {puppet.place.path: path for path, puppet in self.puppets.items()}
             active = tuple(sorted(paths[path] for path in run.active() if path in paths))
-            return ActivityReplay(counted.most, counted.least, active)
+            is_broken = counted.most > 1 or (self.verdict.claim == "exactly one" and counted.least == 0)
+            return ActivityReplay(counted.most, counted.least, active, "" if is_broken else self._unknown())
+
+    def _unknown(self) -> str:
+        """Name the activity that lies on an edge during a step, which puppets do not let happen."""
+        before: tuple[str, ...] = ()
+        for step in self.verdict.steps:
+            waiting = [edge for edge in before if edge in step.under_way]
+            if waiting:
+                return (
+                    f'activity lies on "{waiting[0]}" while {step.text}: a puppet takes it earlier, so whether a run '
+                    "can be that slow is unknown"
+                )
+            before = step.under_way
+        return "the steps did not add up with puppets, so whether a run can take them is unknown"
 
     async def _take(self, run: hfg.Run, step: Step) -> None:
         puppet = self.puppets.get(step.path)
@@ -205,7 +221,7 @@ class _Counted:
             if target not in self.places or event.token.activity != 1:
                 return
             self.lying += 1 if isinstance(event, trace.TokenSent) else -1
-        else:
+        elif not isinstance(event, trace.FiringEnded | trace.CallEnded):
             return
         if not isinstance(event, trace.TokenSent):  # until it is sent as a whole, the sender is still active (A5)
             self.most = max(self.most, len(self.active) + self.lying)

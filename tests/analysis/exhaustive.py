@@ -298,6 +298,12 @@ class Explored:
         machine = self.machine
         if not key[0][station.leaf.index] and not self._matters(station):
             return
+        lying = [machine.lines[number].edge for number, _ in key[1]]
+        if any(
+            edge.target.owner == station.leaf.index and edge.target.kind == "slot" and edge.source.name == "start"
+            for edge in lying
+        ):
+            return  # nothing is called before what `start` sends to it (rules A10, F9)
         fires = isinstance(station.node, Fires)
         into = {line.edge.target.name: line for line in machine.lines if line.edge.target.owner == station.leaf.index}
         line = into["mode" if fires else "send"]

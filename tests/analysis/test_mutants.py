@@ -51,6 +51,24 @@ def test_counter_examples_of_random_graphs_happen_in_the_engine() -> None:
     assert replayed > 15
 
 
+@pytest.mark.rule("A4", "F9", "A10")
+def test_nearly_all_counter_examples_with_explicit_modifiers_happen_and_the_others_say_unknown() -> None:
+    replayed, unknown = 0, []
+    for seed in range(250):
+        drawn = draw(seed)
+        for region in hfg.analyse_activity(drawn.graph, max_states=300).regions if not drawn.is_plain else ():
+            if region.at_most_one.holds is False:
+                replay = replay_activity(drawn.graph, region.at_most_one)
+                if replay.most > 1:
+                    assert replay.unknown == ""
+                    replayed += 1
+                else:
+                    unknown.append(replay.unknown)
+    assert replayed > 50
+    assert len(unknown) < replayed / 10
+    assert all("unknown" in one for one in unknown)
+
+
 def test_what_is_proved_cannot_be_replayed() -> None:
     graph = build()
     with pytest.raises(UsageError, match="no counter-example was found: at most one of 43 nodes"):

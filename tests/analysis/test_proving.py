@@ -356,3 +356,48 @@ def test_exactly_one_as_a_premise_excludes_that_activity_is_lost() -> None:
     found = hfg.analyse_activity(graph).exactly_one("one", "two", "last")
     assert found.holds
     assert found.given
+
+
+# --- what comes first
+
+
+class Says(hfg.Node):
+    """Sends a modifier of its own."""
+
+    a = hfg.Event()
+
+    @hfg.slot
+    def take(self) -> None:
+        """Receive activity."""
+
+    @hfg.slot
+    def send(self) -> None:
+        self.a.trigger(activity=1)
+
+
+def relay() -> hfg.Graph:
+    graph = hfg.Graph("relay")
+    one, two = graph.add(Says(), name="one"), graph.add(Says(), name="two")
+    graph.start.activates(one.take)
+    one.a.activates(two.take)
+    return graph
+
+
+@pytest.mark.rule("A4", "A10", "F9")
+def test_a_call_comes_after_what_start_has_sent_to_the_node_so_it_is_active_then() -> None:
+    graph = relay()
+    found = hfg.analyse_activity(graph).at_most_one("one", "two")
+    assert found.holds is False
+    assert len(found.steps) == 3, "the first +1 of `one` takes its activity along, the second makes more"
+
+
+@pytest.mark.rule("A10", "F9")
+def test_where_setup_may_send_a_call_may_come_first() -> None:
+    class Early(Says):
+        def setup(self) -> None:
+            self.a.trigger()
+
+    graph = relay()
+    graph.add(Early(), name="early")
+    found = hfg.analyse_activity(graph).at_most_one("one", "two")
+    assert len(found.steps) == 1
