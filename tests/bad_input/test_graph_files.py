@@ -529,18 +529,18 @@ def test_a_kill_while_saving_leaves_the_old_file_whole(monkeypatch: pytest.Monke
     """The new one takes its place in one step, when it is on the disk."""
     path = write("as before")
     steps: list[tuple[str, str]] = []
-    sync, replace = os.fsync, Path.replace
+    sync, replace = os.fsync, os.replace
 
     def synced(descriptor: int) -> None:
         steps.append(("sync", path.read_text()))
         sync(descriptor)
 
-    def replaced(new: Path, target: Path) -> Path:
+    def replaced(new: str, target: str, **folders: int) -> None:
         steps.append(("replace", path.read_text()))
-        return replace(new, target)
+        replace(new, target, **folders)
 
     monkeypatch.setattr(os, "fsync", synced)
-    monkeypatch.setattr(Path, "replace", replaced)
+    monkeypatch.setattr(os, "replace", replaced)
     save(hfg.Graph("new"), path)
     assert steps == [("sync", "as before"), ("replace", "as before"), ("sync", "hfg: 1\nname: new\n")]
 
