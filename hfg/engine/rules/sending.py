@@ -245,9 +245,15 @@ def trigger(
             _into_operators(edge, Token(value, modifier, stamp))
         else:
             put_signal(edge, value, modifier, stamp)
-    if carried:
-        activity_left(worker)
-    sent(core)
+    if core.returned:
+        with deferring_events(core):  # those of an idle sender follow what comes back to it (A8, A9)
+            if carried:
+                activity_left(worker)
+            sent(core)
+    else:
+        if carried:
+            activity_left(worker)
+        sent(core)
     if not core.pumping:
         core.runtime.kick()
     if core.to_notify:

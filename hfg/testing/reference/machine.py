@@ -401,12 +401,11 @@ class ReferenceMachine(Rings):
         found = []
         moot = self.moot_sources()
         for index, station in enumerate(self.stations):
-            resting = self.is_suspended_source(index) or self.is_resting(index)
             if (
                 station.type.is_source
                 and self.is_enabled(index)
                 and not station.ended
-                and not resting
+                and not self.is_suspended_source(index)  # one that is throttled would fire in time, were it not blocked
                 and index not in moot
             ):
                 found.append(station.path)
