@@ -11,7 +11,9 @@ from hfg.analysis.reach import Reach
 from hfg.analysis.searching import Searched
 from hfg.errors import Problem
 from hfg.graph.flat import ROOT
+from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import NodeType
+from hfg.ports import InnerSource, InnerTarget, Port
 
 __all__ = ["problems_of", "without_limit"]
 
@@ -24,6 +26,7 @@ def problems_of(reach: Reach, facts: Iterable[StatedFact]) -> Iterator[Problem]:
     yield from _half_active_slots(reach)
     yield from _unlike_their_kind(reach)
     yield from _ungated(reach)
+    yield from _half_ways(reach)
     yield from _doubtful(facts)
 
 
@@ -195,6 +198,42 @@ def _ungated(reach: Reach) -> list[Problem]:
         )
         for index, others in found.items()
     ]
+
+
+def _half_ways(reach: Reach) -> Iterator[Problem]:
+    """Active edges to or from a port of a subgraph that has no active edge on its other side (rule G1)."""
+    levels = reach.game.flat.level.whole.root.walk()
+    edges = [edge for level in levels for edge in level.edges if edge.active]
+    sides: dict[Port, set[bool]] = {}  # of each port, the sides that have active edges: True inside a subgraph
+    for edge in edges:
+        for end in (edge.source, edge.target):
+            if isinstance(end, InnerSource | InnerTarget):
+                sides.setdefault(end.outer, set()).add(True)
+            elif isinstance(end, Port):
+                sides.setdefault(end, set()).add(False)
+    for edge in edges:
+        for end in (edge.source, edge.target):
+            port = end.outer if isinstance(end, InnerSource | InnerTarget) else end
+            if not isinstance(port, Port) or not _is_border(port) or len(sides[port]) == 2:
+                continue
+            way, side = ("to" if end is edge.target else "from"), ("outside" if port is not end else "inside")
+            yield Problem(
+                path=edge.label,
+                severity="hint",
+                what=f"it is active, and moves no activity {way} a port of a subgraph",
+                why=f'no active edge meets "{port.path}" {side} of the subgraph (rule G1)',
+                remedy=f"connect it {side} by an active edge, or make this edge inactive",
+                check="half-way",
+            )
+
+
+def _is_border(port: Port) -> bool:
+    """Whether it is a port that a subgraph declares, and that hands on what comes."""
+    if not is_box(port.node):
+        return False
+    kind = port.node._type
+    declared = {"input": kind.inputs, "output": kind.outputs, "slot": kind.slots, "event": kind.events}
+    return port.name in declared.get(port.kind, {})
 
 
 def _doubtful(facts: Iterable[StatedFact]) -> Iterator[Problem]:

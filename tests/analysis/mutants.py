@@ -69,6 +69,8 @@ MUTANTS: dict[str, Change] = {
     "the time-out of the way is not active": not_active(f"{VISIT}/go_to.timeout", f"{VISIT}.gave_up.inner"),
     "no edge to the wait": missing(f"{VISIT}/lamp_on.done", f"{VISIT}/wait.begin"),
     "no edge to the station": missing(f"{FETCH}/select.station", f"{FETCH}/visit.begin"),
+    "no way out of a view that gives up": missing(f"{ROBOT}/explore.gave_up", f"{FETCH}.begin"),
+    "no way for a view to give up": missing(f"{ROBOT}/explore/view.gave_up", f"{ROBOT}/explore.gave_up.inner"),
     "no gate of dock": ungated(f"{VISIT}/dock"),
     "no gate of leave": ungated(f"{VISIT}/leave"),
     "no gate of the way": ungated(f"{VISIT}/go_to"),
