@@ -14,7 +14,7 @@ import functools
 import inspect
 import linecache
 import types
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
@@ -371,54 +371,62 @@ class _Type:
         return _either(found, {"next": now})
 
     def _statement(self, one: ast.stmt, scope: _Scope) -> _Ways:
-        match one:
-            case ast.Return():
-                return {"return": _product(self._value(one.value, scope), self._returned(one.value, scope))}
-            case ast.Raise():
-                return {"raise": self._all([one.exc, one.cause], scope)}
-            case ast.Break():
-                return {"break": {NOTHING}}
-            case ast.Continue():
-                return {"continue": {NOTHING}}
-            case ast.If():
-                choice = _either(self._block(one.body, scope), self._block(one.orelse, scope))
-                return _after(self._value(one.test, scope), choice)
-            case ast.While():
-                loop = self._loop(_after(self._value(one.test, scope), self._block(one.body, scope)))
-                if isinstance(one.test, ast.Constant) and one.test.value:
-                    loop["next"] = loop.pop("broken", set())
-                    if not loop["next"]:
-                        del loop["next"]
-                    return loop
-                loop["next"] |= loop.pop("broken", set())
-                return _after(self._value(one.test, scope), loop)
-            case ast.For() | ast.AsyncFor():
-                loop = self._loop(self._block(one.body, scope))
-                loop["next"] |= loop.pop("broken", set())
-                loop = _either(
-                    {key: bags for key, bags in loop.items() if key != "next"},
-                    _after(loop["next"], self._block(one.orelse, scope)),
-                    {"next": loop["next"]},
-                )
-                return _after(self._value(one.iter, scope), loop)
-            case ast.With() | ast.AsyncWith():
-                before = self._all([item.context_expr for item in one.items], scope)
-                ways = self._block(one.body, scope)
-                return _after(before, _either(ways, {"next": _parts(ways)}))  # a context may swallow an exception
-            case ast.Try() | ast.TryStar():
-                return self._try(one, scope)
-            case ast.Match():
-                cases = [_after(self._all([case.guard], scope), self._block(case.body, scope)) for case in one.cases]
-                return _after(self._value(one.subject, scope), _either({"next": {NOTHING}}, *cases))
-            case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
-                self._nested(one, scope)
-                return {"next": {NOTHING}}
-            case ast.Assign() | ast.AnnAssign():
-                targets = one.targets if isinstance(one, ast.Assign) else [one.target]
-                is_local = all(isinstance(target, ast.Name) for target in targets)
-                value = self._value(one.value, scope, aliased=is_local)
-                return {"next": _product(value, self._all([t for t in targets if not isinstance(t, ast.Name)], scope))}
+        handle = _STATEMENTS.get(type(one))
+        if handle is not None:
+            found: _Ways = handle(self, one, scope)
+            return found
         return {"next": self._all([part for part in ast.iter_child_nodes(one) if isinstance(part, ast.expr)], scope)}
+
+    def _return(self, one: ast.Return, scope: _Scope) -> _Ways:
+        return {"return": _product(self._value(one.value, scope), self._returned(one.value, scope))}
+
+    def _raise(self, one: ast.Raise, scope: _Scope) -> _Ways:
+        return {"raise": self._all([one.exc, one.cause], scope)}
+
+    def _jump(self, one: ast.Break | ast.Continue, scope: _Scope) -> _Ways:
+        return {"break" if isinstance(one, ast.Break) else "continue": {NOTHING}}
+
+    def _if(self, one: ast.If, scope: _Scope) -> _Ways:
+        choice = _either(self._block(one.body, scope), self._block(one.orelse, scope))
+        return _after(self._value(one.test, scope), choice)
+
+    def _while(self, one: ast.While, scope: _Scope) -> _Ways:
+        loop = self._loop(_after(self._value(one.test, scope), self._block(one.body, scope)))
+        broken = loop.pop("broken", set())
+        if isinstance(one.test, ast.Constant) and one.test.value:
+            del loop["next"]
+            return {**loop, "next": broken} if broken else loop
+        loop["next"] |= broken
+        return _after(self._value(one.test, scope), loop)
+
+    def _for(self, one: ast.For | ast.AsyncFor, scope: _Scope) -> _Ways:
+        loop = self._loop(self._block(one.body, scope))
+        loop["next"] |= loop.pop("broken", set())
+        loop = _either(
+            {key: bags for key, bags in loop.items() if key != "next"},
+            _after(loop["next"], self._block(one.orelse, scope)),
+            {"next": loop["next"]},
+        )
+        return _after(self._value(one.iter, scope), loop)
+
+    def _with(self, one: ast.With | ast.AsyncWith, scope: _Scope) -> _Ways:
+        before = self._all([item.context_expr for item in one.items], scope)
+        ways = self._block(one.body, scope)
+        return _after(before, _either(ways, {"next": _parts(ways)}))  # a context may swallow an exception
+
+    def _match(self, one: ast.Match, scope: _Scope) -> _Ways:
+        cases = [_after(self._all([case.guard], scope), self._block(case.body, scope)) for case in one.cases]
+        return _after(self._value(one.subject, scope), _either({"next": {NOTHING}}, *cases))
+
+    def _define(self, one: ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef, scope: _Scope) -> _Ways:
+        self._nested(one, scope)
+        return {"next": {NOTHING}}
+
+    def _assign(self, one: ast.Assign | ast.AnnAssign, scope: _Scope) -> _Ways:
+        targets = one.targets if isinstance(one, ast.Assign) else [one.target]
+        is_local = all(isinstance(target, ast.Name) for target in targets)
+        value = self._value(one.value, scope, aliased=is_local)
+        return {"next": _product(value, self._all([t for t in targets if not isinstance(t, ast.Name)], scope))}
 
     def _loop(self, body: _Ways) -> _Ways:
         """None, once or often."""
@@ -487,40 +495,12 @@ class _Type:
 
     def _value(self, one: ast.expr | None, scope: _Scope, *, aliased: bool = False) -> set[Bag]:
         """The bags that are sent while an expression is evaluated."""
-        if one is None or isinstance(one, ast.Constant):
+        if one is None:
             return {NOTHING}
-        if isinstance(one, ast.Name):
-            if one.id == scope.me and scope.me:
-                raise _Unknown("it hands the node on")
-            if one.id in scope.names and isinstance(one.ctx, ast.Load) and not aliased:
-                self.loose |= scope.names[one.id]
-            return {NOTHING}
-        match one:
-            case ast.Call():
-                return self._call(one, scope)
-            case ast.Lambda():
-                self._nested(one, scope)
-                return {NOTHING}
-            case ast.IfExp():
-                choice = self._value(one.body, scope, aliased=aliased) | self._value(one.orelse, scope, aliased=aliased)
-                return _product(self._value(one.test, scope), choice)
-            case ast.BoolOp():
-                so_far = self._value(one.values[0], scope, aliased=aliased)
-                found = set(so_far)
-                for part in one.values[1:]:
-                    so_far = _product(so_far, self._value(part, scope, aliased=aliased))
-                    found |= so_far
-                return found
-            case ast.ListComp() | ast.SetComp() | ast.GeneratorExp() | ast.DictComp():
-                return self._comprehension(one, scope)
-            case ast.Await():
-                return self._value(one.value, scope)
-            case ast.Yield():
-                sent = self._returned(one.value, scope) if scope.is_process and not scope.depth else {NOTHING}
-                return _product(self._all([one.value], scope), sent)
-            case ast.YieldFrom():
-                sent = _some_of(name for name in self.outputs if name in self.ports)
-                return _product(self._all([one.value], scope), sent)
+        handle = _EXPRESSIONS.get(type(one))
+        if handle is not None:
+            found: set[Bag] = handle(self, one, scope, aliased)
+            return found
         ports = self._port(one, scope.me, scope.names)
         if ports:
             if not aliased:
@@ -529,11 +509,49 @@ class _Type:
         name = _own(one, scope.me)
         if name is not None:
             return self._attribute(name, scope)
-        parts = [part for part in ast.iter_child_nodes(one) if isinstance(part, ast.expr)]
         found = {NOTHING}
-        for part in parts:
-            found = _product(found, self._value(part, scope, aliased=aliased and isinstance(one, ast.Tuple | ast.List)))
+        for part in ast.iter_child_nodes(one):
+            if isinstance(part, ast.expr):
+                handed_on = aliased and isinstance(one, ast.Tuple | ast.List)
+                found = _product(found, self._value(part, scope, aliased=handed_on))
         return found
+
+    def _constant(self, one: ast.Constant, scope: _Scope, aliased: bool) -> set[Bag]:
+        return {NOTHING}
+
+    def _name(self, one: ast.Name, scope: _Scope, aliased: bool) -> set[Bag]:
+        if one.id == scope.me and scope.me:
+            raise _Unknown("it hands the node on")
+        if one.id in scope.names and isinstance(one.ctx, ast.Load) and not aliased:
+            self.loose |= scope.names[one.id]
+        return {NOTHING}
+
+    def _lambda(self, one: ast.Lambda, scope: _Scope, aliased: bool) -> set[Bag]:
+        self._nested(one, scope)
+        return {NOTHING}
+
+    def _choice(self, one: ast.IfExp, scope: _Scope, aliased: bool) -> set[Bag]:
+        choice = self._value(one.body, scope, aliased=aliased) | self._value(one.orelse, scope, aliased=aliased)
+        return _product(self._value(one.test, scope), choice)
+
+    def _and_or(self, one: ast.BoolOp, scope: _Scope, aliased: bool) -> set[Bag]:
+        so_far = self._value(one.values[0], scope, aliased=aliased)
+        found = set(so_far)
+        for part in one.values[1:]:
+            so_far = _product(so_far, self._value(part, scope, aliased=aliased))
+            found |= so_far
+        return found
+
+    def _await(self, one: ast.Await, scope: _Scope, aliased: bool) -> set[Bag]:
+        return self._value(one.value, scope)
+
+    def _yield(self, one: ast.Yield, scope: _Scope, aliased: bool) -> set[Bag]:
+        sent = self._returned(one.value, scope) if scope.is_process and not scope.depth else {NOTHING}
+        return _product(self._all([one.value], scope), sent)
+
+    def _yield_from(self, one: ast.YieldFrom, scope: _Scope, aliased: bool) -> set[Bag]:
+        sent = _some_of(name for name in self.outputs if name in self.ports)
+        return _product(self._all([one.value], scope), sent)
 
     def _attribute(self, name: str, scope: _Scope) -> set[Bag]:
         """`self.name` as a value: a property runs; a method may be called by the code that receives it."""
@@ -549,7 +567,7 @@ class _Type:
                 self.inline.add(name)
         return {NOTHING}
 
-    def _comprehension(self, one: Any, scope: _Scope) -> set[Bag]:
+    def _comprehension(self, one: Any, scope: _Scope, aliased: bool) -> set[Bag]:
         values = [one.key, one.value] if isinstance(one, ast.DictComp) else [one.elt]
         conditions = [part for generator in one.generators for part in generator.ifs]
         inner = [generator.iter for generator in one.generators[1:]]
@@ -559,31 +577,34 @@ class _Type:
             before = self._value(one.generators[0].iter, scope)
         return _product(before, often)
 
-    def _call(self, one: ast.Call, scope: _Scope) -> set[Bag]:
+    def _call(self, one: ast.Call, scope: _Scope, aliased: bool) -> set[Bag]:
         function = one.func
         if isinstance(function, ast.Attribute) and function.attr in _SENDS:
             ports = self._port(function.value, scope.me, scope.names)
             if ports:
-                inside = function.value.slice if isinstance(function.value, ast.Subscript) else None
-                before = self._all([inside, *one.args, *(k.value for k in one.keywords)], scope)
-                modifier = next((keyword.value for keyword in one.keywords if keyword.arg == "activity"), None)
-                sent: set[Bag] = set()
-                for port in ports:
-                    once = [frozenset({(sending, 1)}) for sending in self._sendings(port, modifier)]
-                    sent |= set(once) or {NOTHING}
-                    if modifier is not None and not isinstance(modifier, ast.Constant | ast.UnaryOp):
-                        sent.add(NOTHING)  # it may be 0
-                return _product(before, sent)
+                return self._sending(one, function.value, ports, scope)
         arguments = [*one.args, *(keyword.value for keyword in one.keywords)]
         given = [part.value if isinstance(part, ast.Starred) else part for part in arguments]
-        if any(isinstance(part, ast.Name) and part.id == scope.me for part in given) and scope.me:
+        others = [part for part in given if not (scope.me and isinstance(part, ast.Name) and part.id == scope.me)]
+        if len(others) < len(given):
             self._need_harmless(function, scope)
-            given = [part for part in given if not (isinstance(part, ast.Name) and part.id == scope.me)]
         hands_on = isinstance(function, ast.Name) and function.id in _HANDS_ON
         before = {NOTHING}
-        for part in given:
+        for part in others:
             before = _product(before, self._value(part, scope, aliased=hands_on))
         return _product(before, self._called(function, scope))
+
+    def _sending(self, one: ast.Call, over: ast.expr, ports: frozenset[str], scope: _Scope) -> set[Bag]:
+        """The bags of `self.port.trigger(...)`, over one of these ports."""
+        inside = over.slice if isinstance(over, ast.Subscript) else None
+        before = self._all([inside, *one.args, *(keyword.value for keyword in one.keywords)], scope)
+        modifier = next((keyword.value for keyword in one.keywords if keyword.arg == "activity"), None)
+        sent: set[Bag] = set()
+        for port in ports:
+            sent |= {frozenset({(sending, 1)}) for sending in self._sendings(port, modifier)} or {NOTHING}
+        if modifier is not None and not isinstance(modifier, ast.Constant | ast.UnaryOp):
+            sent.add(NOTHING)  # it may be 0
+        return _product(before, sent)
 
     def _called(self, function: ast.expr, scope: _Scope) -> set[Bag]:
         """The bags that a called function sends, if it is one of the node's."""
@@ -619,6 +640,46 @@ class _Type:
         name = ast.unparse(function)
         if called is None or not _is_harmless(called):
             raise _Unknown(f"it hands the node to {name}")
+
+
+_STATEMENTS: Final[dict[type[ast.stmt], Callable[..., _Ways]]] = {
+    ast.Return: _Type._return,
+    ast.Raise: _Type._raise,
+    ast.Break: _Type._jump,
+    ast.Continue: _Type._jump,
+    ast.If: _Type._if,
+    ast.While: _Type._while,
+    ast.For: _Type._for,
+    ast.AsyncFor: _Type._for,
+    ast.With: _Type._with,
+    ast.AsyncWith: _Type._with,
+    ast.Try: _Type._try,
+    ast.TryStar: _Type._try,
+    ast.Match: _Type._match,
+    ast.FunctionDef: _Type._define,
+    ast.AsyncFunctionDef: _Type._define,
+    ast.ClassDef: _Type._define,
+    ast.Assign: _Type._assign,
+    ast.AnnAssign: _Type._assign,
+}
+"""What reads each kind of statement; of all others only the expressions in them matter."""
+
+_EXPRESSIONS: Final[dict[type[ast.expr], Callable[..., set[Bag]]]] = {
+    ast.Constant: _Type._constant,
+    ast.Name: _Type._name,
+    ast.Call: _Type._call,
+    ast.Lambda: _Type._lambda,
+    ast.IfExp: _Type._choice,
+    ast.BoolOp: _Type._and_or,
+    ast.ListComp: _Type._comprehension,
+    ast.SetComp: _Type._comprehension,
+    ast.GeneratorExp: _Type._comprehension,
+    ast.DictComp: _Type._comprehension,
+    ast.Await: _Type._await,
+    ast.Yield: _Type._yield,
+    ast.YieldFrom: _Type._yield_from,
+}
+"""What reads each kind of expression; all others send what their parts send."""
 
 
 def _loosened(handler: Handler, more: set[Sent]) -> Handler:

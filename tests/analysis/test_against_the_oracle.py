@@ -58,6 +58,7 @@ def test_every_state_of_random_graphs_is_in_the_game_and_plain_graphs_have_no_ot
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(1800)
 def test_every_state_of_5000_random_graphs_is_in_the_game() -> None:
     seen = Counter(compare(draw(seed)) for seed in range(1_000, 6_000))
     assert seen["equal"] > 1_000, seen

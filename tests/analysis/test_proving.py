@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import msgspec
 import pytest
 
@@ -401,3 +404,32 @@ def test_where_setup_may_send_a_call_may_come_first() -> None:
     graph.add(Early(), name="early")
     found = hfg.analyse_activity(graph).at_most_one("one", "two")
     assert len(found.steps) == 1
+
+
+# --- after an edit
+
+
+@pytest.mark.rule("R4")
+def test_the_analysis_follows_edits_of_a_graph_at_rest() -> None:
+    graph = relay()
+    assert hfg.analyse_activity(graph).may_be_active("two")
+    graph.edit(commands.MakeActive("one.a", "two.take", False))
+    report = hfg.analyse_activity(graph)
+    assert report.regions[0].nodes == ("one",)
+    graph.undo()
+    assert hfg.analyse_activity(graph).may_be_active("two")
+
+
+@pytest.mark.rule("R4")
+def test_the_analysis_follows_edits_of_a_run(virtual_time: Callable[[Any], None]) -> None:
+    async def main() -> None:
+        async with hfg.running(relay()) as run:
+            await run.wait_quiet()
+            await run.edit(commands.MakeActive("one.a", "two.take", False))
+            assert hfg.analyse_activity(run.graph).regions[0].nodes == ("one",)
+            await run.edit(commands.Fact("at most one", ("one", "two")))
+            assert [one.fact for one in hfg.analyse_activity(run.graph).facts] == [
+                'at most one of "one", "two" is active'
+            ]
+
+    virtual_time(main())
