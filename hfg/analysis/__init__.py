@@ -1,6 +1,8 @@
 """Analyses of a graph before it runs.
 
-reading    what the code of a node type may send         game       activity as a token game
+bags       what one firing or call may send             sources    the functions of node types
+walking    every way through a method                   reading    what the code of a node type may send
+game       activity as a token game
 searching  its states, and which places go together      proving    proofs and counter-examples
 reach      what activity reaches, region by region       findings   what is probably a mistake
 diagram    the states, and what leads where              wording    a report in words

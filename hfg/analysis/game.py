@@ -17,7 +17,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
-from hfg.analysis.reading import NOTHING, Bag, Handler, Sent, parts_of, read
+from hfg.analysis.bags import NOTHING, Bag, Handler, Sent, parts_of
+from hfg.analysis.reading import read
 from hfg.errors import GraphError
 from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.nodetypes.description import NodeType

@@ -8,7 +8,8 @@ import pytest
 
 import hfg
 from hfg.activity import StateNode
-from hfg.analysis.reading import Code, Handler, read
+from hfg.analysis.bags import Code, Handler
+from hfg.analysis.reading import read
 from hfg.nodes import activity
 from hfg.nodes._alarm import Alarm
 
