@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 
 from hfg.analysis.game import Play
 from hfg.analysis.proving import StatedFact, Step, steps_to
@@ -15,7 +15,7 @@ from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import NodeType
 from hfg.ports import InnerSource, InnerTarget, Port
 
-__all__ = ["problems_of", "without_limit"]
+__all__ = ["leaves_within", "problems_of", "without_limit"]
 
 
 def problems_of(reach: Reach, facts: Iterable[StatedFact]) -> Iterator[Problem]:
@@ -88,14 +88,27 @@ def _stuck(reach: Reach, play: Play, found: Searched) -> list[Problem]:
     ]
 
 
-def without_limit(reach: Reach) -> list[str]:
+def leaves_within(reach: Reach) -> dict[str, float]:
+    """Return for each node that may be active the seconds after which a time-out takes its activity at the latest.
+
+    The time-out may be its own, or that of a subgraph around it (rules A12, G2). One whose only active edges lead to
+    nodes that can be disabled does not count, because the activity then stays (rule A8).
+    """
+    game, found = reach.game, dict[str, float]()
+    for end, options in game.flat.options():
+        if options.active_for_s is None or game.may_stay(end, "timeout"):
+            continue
+        for index in game.flat.members(end):
+            path = game.flat.path(index)
+            if index in game.bits.node and reach.may_be_active(index):
+                found[path] = min(options.active_for_s, found.get(path, options.active_for_s))
+    return found
+
+
+def without_limit(reach: Reach, limits: Container[str]) -> list[str]:
     """Nodes that may be active, and that neither a time-out of their own nor one around them makes inactive."""
-    game = reach.game
-    limited: set[int] = set()
-    for rule in game.rules:
-        if rule.kind == "times out" and rule.gives:
-            limited.update(game.flat.members(rule.actor))
-    return [game.flat.path(index) for index in game.nodes if index not in limited and reach.may_be_active(index)]
+    paths = [reach.game.flat.path(index) for index in reach.game.nodes if reach.may_be_active(index)]
+    return [path for path in paths if path not in limits]
 
 
 def _kept_by_time_out(reach: Reach) -> list[Problem]:

@@ -393,6 +393,10 @@ class Game:
         for number in self.into.get(end, ()):  # a subgraph's own slots keep no activity
             self.rules.append(Rule(f'"{scope.path}" keeps no activity', "loses", end, number))
 
+    def may_stay(self, end: int, port: str) -> bool:
+        """Return whether activity may stay when a node or subgraph sends over a port (rule A8)."""
+        return not set(self.out.get((end, port), ())) - self._fragile
+
     # --- places
 
     def _number(self) -> _Bits:

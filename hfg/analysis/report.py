@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from hfg.analysis.diagram import StateDiagram, diagram_of
-from hfg.analysis.findings import problems_of, without_limit
+from hfg.analysis.findings import leaves_within, problems_of, without_limit
 from hfg.analysis.game import Unread
 from hfg.analysis.proving import Region, StatedFact, Verdict
 from hfg.analysis.reach import Reach
@@ -39,6 +39,7 @@ class ActivityReport:
       facts: what the graph states, and whether it follows without being stated.
       problems: what is probably a mistake, as `graph.check()` gives them.
       unread: the code that could not be read; anything is assumed of it.
+      leaves_within_s: nodes that a time-out makes inactive, by path, and after how many seconds at the latest.
       without_limit: nodes that may keep their activity forever, since no time-out takes it from them.
     """
 
@@ -48,7 +49,8 @@ class ActivityReport:
         self.unread: list[Unread] = list(dict.fromkeys(reach.game.unread))
         self.regions = [self._region(number) for number in range(len(reach.plays))]
         self.facts = [self._fact(fact) for fact in facts]
-        self.without_limit = without_limit(reach)
+        self.leaves_within_s = leaves_within(reach)
+        self.without_limit = without_limit(reach, self.leaves_within_s)
         self.problems: list[Problem] = list(problems_of(reach, self.facts))
 
     # --- questions
@@ -105,6 +107,7 @@ class ActivityReport:
             "facts": [data_of_fact(fact) for fact in self.facts],
             "states": self.diagram().as_data(),
             "unread": [{"path": one.path, "handler": one.handler, "why": one.why} for one in self.unread],
+            "leaves_within_s": self.leaves_within_s,
             "without_limit": self.without_limit,
         }
 

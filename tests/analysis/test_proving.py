@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import pytest
@@ -433,3 +433,40 @@ def test_the_analysis_follows_edits_of_a_run(virtual_time: Callable[[Any], None]
             ]
 
     virtual_time(main())
+
+
+# --- time
+
+
+def limited(*, on_error: Literal["stop", "disable"] = "stop") -> hfg.Graph:
+    graph = hfg.Graph("limited")
+    one = graph.add(Hidden(), name="one", active_for_s=5.0)
+    two, home = graph.add(Hidden(), name="two"), graph.add(Hidden(), name="home", on_error=on_error)
+    graph.start.activates(one.take)
+    one.a.activates(two.take)
+    one.timeout.activates(home.take)
+    return graph
+
+
+@pytest.mark.rule("A12", "G2")
+def test_a_time_out_that_leads_on_bounds_how_long_a_node_is_active() -> None:
+    graph = limited()
+    report = hfg.analyse_activity(graph)
+    assert report.leaves_within_s == {"one": 5.0}
+    assert report.without_limit == ["two", "home"]
+    graph.edit(commands.MakeActive("one.timeout", "home.take", False))
+    assert hfg.analyse_activity(graph).leaves_within_s == {}
+
+
+@pytest.mark.rule("A8", "A12")
+def test_a_time_out_that_leads_only_to_a_node_that_can_be_disabled_bounds_nothing() -> None:
+    assert hfg.analyse_activity(limited(on_error="disable")).leaves_within_s == {}
+
+
+@pytest.mark.rule("A12", "G2")
+def test_a_time_out_of_a_subgraph_bounds_all_nodes_inside() -> None:
+    report = hfg.analyse_activity(build())
+    limits = report.leaves_within_s
+    inside = [path for path in limits if path.startswith("robot_0/explore/go_to/")]
+    assert inside
+    assert limits["robot_0/explore/go_to/plan"] <= min(limits[path] for path in inside)
