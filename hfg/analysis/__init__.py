@@ -7,10 +7,22 @@ searching  its states, and which places go together      proving    proofs and c
 reach      what activity reaches, region by region       findings   what is probably a mistake
 diagram    the states, and what leads where              wording    a report in words
 report     the analysis of activity, for users
+response   response times on one processor         timing       deadlines of a graph
 """
 
 from hfg.analysis.diagram import StateDiagram
 from hfg.analysis.proving import Region, Step, Verdict
 from hfg.analysis.report import ActivityReport, analyse_activity
+from hfg.analysis.timing import PathTime, TimeReport, analyse_time
 
-__all__ = ["ActivityReport", "Region", "StateDiagram", "Step", "Verdict", "analyse_activity"]
+__all__ = [
+    "ActivityReport",
+    "PathTime",
+    "Region",
+    "StateDiagram",
+    "Step",
+    "TimeReport",
+    "Verdict",
+    "analyse_activity",
+    "analyse_time",
+]

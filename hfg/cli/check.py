@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from hfg.analysis.report import MAX_STATES, ActivityReport, analyse_activity
+from hfg.analysis.timing import TimeReport, analyse_time
 from hfg.cli import show
 from hfg.cli.options import LoadFlags, TargetArgument
 from hfg.cli.target import load_graph
@@ -31,6 +32,9 @@ def check(
             "--states", min=1, help=f"How many states of a part of the graph --activity looks at ({MAX_STATES:,})."
         ),
     ] = None,
+    time: Annotated[
+        bool, typer.Option("--time", help="Also bound how long ways from sources with a rate take; see takes_s.")
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Write the problems as JSON.")] = False,
 ) -> int:
     """Check a graph for errors without running it (exit code 1 if there are any)."""
@@ -41,7 +45,7 @@ def check(
     with keep_refusals() as found.problems:
         graph = found.load(flags)
     if graph is not None:
-        found.look_at(graph, MAX_STATES if states is None else states, activity=activity)
+        found.look_at(graph, MAX_STATES if states is None else states, activity=activity, time=time)
     if json:
         show.json(found.as_data(activity=activity))
     else:
@@ -62,6 +66,7 @@ class _Findings:
         self._target = target
         self._costs: Sequence[Problem] = ()
         self._activity: ActivityReport | None = None
+        self._time: TimeReport | None = None
 
     def load(self, flags: LoadFlags) -> Graph | None:
         """Build the graph; nothing where its code or its file is refused.
@@ -81,7 +86,7 @@ class _Findings:
             self.refused_file = error
         return None
 
-    def look_at(self, graph: Graph, states: int, *, activity: bool) -> None:
+    def look_at(self, graph: Graph, states: int, *, activity: bool, time: bool) -> None:
         """Check a graph that could be built."""
         self._name = f'graph "{graph.name}"'
         refused = {problem.path.rpartition(" -> ")[2] for problem in self.problems}
@@ -91,6 +96,9 @@ class _Findings:
         if activity and not self.count("error"):
             self._activity = analyse_activity(graph, max_states=states)
             self.problems += self._activity.problems
+        if time and not self.count("error"):
+            self._time = analyse_time(graph)
+            self.problems += self._time.problems
         if not self.count("error"):
             self._costs = list(costs_of_deaths(graph))
 
@@ -101,9 +109,10 @@ class _Findings:
     def as_data(self, *, activity: bool) -> object:
         """Return what `--json` writes."""
         problems = [*self.problems, *self._costs]
-        if not activity:
+        if not (activity or self._time):
             return problems
-        return {"problems": problems, "activity": None if self._activity is None else self._activity.as_data()}
+        found = {"problems": problems, "activity": None if self._activity is None else self._activity.as_data()}
+        return found if self._time is None else found | {"time": self._time}
 
     def lines(self) -> Iterator[str]:
         """Return what a person reads."""
@@ -113,6 +122,8 @@ class _Findings:
             yield f"{problem} [{problem.check}]"
         if self._activity is not None:
             yield from self._activity.lines()
+        if self._time is not None:
+            yield from self._time.lines()
         counts = [_count(self.count(severity), severity) for severity in ("error", "warning")]
         hints = self.count("hint")
         yield f"{self._name}: {', '.join(counts + ([_count(hints, 'hint')] if hints else []))}"

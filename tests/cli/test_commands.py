@@ -528,3 +528,14 @@ def test_check_tells_everything_that_is_wrong_with_a_machine(hfg: Command, tmp_p
     shown = hfg("check", "machine.py", "--json")
     assert shown.code == 1
     assert [problem["path"] for problem in json.loads(shown.out)] == ["transitions[0]", "transitions[1]"]
+
+
+def test_check_time_bounds_ways_and_lists_what_it_assumes(hfg: Command) -> None:
+    shown = hfg("check", TARGET, "--time")
+    assert "assumed: each group has a processor of its own" in shown.out
+    assert set(json.loads(hfg("check", TARGET, "--time", "--json").out)["time"]) == {
+        "paths",
+        "load",
+        "assumptions",
+        "problems",
+    }

@@ -154,6 +154,7 @@ class NodeGiven(TypedDict, total=False):
     release: Release
     active_for_s: float | None
     deadline_s: float | None
+    takes_s: float | None
     enabled: bool
     iterate_over: Iterable[str]
 
@@ -246,6 +247,13 @@ class NodeFields(Fields[NodeGiven], kw_only=True):
         Option(
             'The maximum age of the oldest token that the node takes, in a group with policy "deadline" (rule R2).',
             above=0,
+        ),
+    ] = None
+    takes_s: Annotated[
+        float | None,
+        Option(
+            "How long a firing or call of the node takes at most, on the machine that runs it, for `hfg check --time`.",
+            least=0,
         ),
     ] = None
     enabled: Annotated[bool, Option("The node is enabled when a run starts.", badge="disabled", only="any")] = True

@@ -1,0 +1,169 @@
+"""Response times of waves that share one processor: bounds that no run exceeds whose durations are as declared.
+
+A group runs one firing at a time, and a firing is never interrupted. All firings that one source starts in a group are a
+*task*, and one wave of it is a job. Times count from the moment at which a wave is due.
+
+| policy | bound | source |
+| --- | --- | --- |
+| fifo | the work of all waves released up to then | George, Minet 1997 |
+| priority | Joseph, Pandya 1986 and Audsley et al. 1993, with blocking by one firing, all jobs of a busy period | Davis, Burns, Bril, Lukkien 2007; Bril, Lukkien, Verhaegh 2009 |
+| deadline | the deadline, if the demand of no interval exceeds it | Baruah, Rosier, Howell 1990; blocking: Baruah 2005 |
+| fair, random | the longest busy period: it holds for each policy that never idles | |
+
+Depends on nothing.
+"""  # noqa: E501 - a table
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+_ENOUGH: Final = 100_000  # steps of an iteration, and points that are looked at
+_ROUNDING: Final = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """The waves that one source starts in one group.
+
+    Attributes:
+      period_s: the shortest time between two waves, above 0.
+      firings_s: how long each firing of a wave takes at most.
+      jitter_s: how much later than due a wave can begin.
+      lowest: the lowest priority of its nodes; larger numbers come first.
+      highest: the highest one.
+      deadline_s: of all its nodes from the begin of the wave; infinity if they have none, or different ones.
+    """
+
+    period_s: float
+    firings_s: tuple[float, ...]
+    jitter_s: float = 0.0
+    lowest: int = 0
+    highest: int = 0
+    deadline_s: float = math.inf
+
+    @property
+    def work_s(self) -> float:
+        """How long all firings of a wave take together."""
+        return sum(self.firings_s)
+
+    @property
+    def longest_s(self) -> float:
+        """How long its longest firing takes."""
+        return max(self.firings_s, default=0.0)
+
+
+def utilisation(tasks: Iterable[Task]) -> float:
+    """Return the share of the processor that tasks need; above 1 their waves pile up."""
+    return sum(task.work_s / task.period_s for task in tasks)
+
+
+def response_times(tasks: Sequence[Task], policy: str) -> list[float]:
+    """Return a bound for the response time of each task, in seconds; infinity if there is none, or it was not found."""
+    if utilisation(tasks) > 1 + _ROUNDING and policy != "priority":
+        return [math.inf] * len(tasks)
+    if policy == "fifo":
+        return [_fifo(tasks) + task.jitter_s for task in tasks]
+    if policy == "priority":
+        return [_priority(tasks, number) for number in range(len(tasks))]
+    busy = _busy(tasks)
+    if policy == "deadline" and _meets_deadlines(tasks, busy):
+        return [task.jitter_s + min(task.deadline_s, busy) for task in tasks]
+    return [busy + task.jitter_s for task in tasks]
+
+
+def _busy(tasks: Sequence[Task], first: float = 0.0) -> float:
+    """Return how long the processor can be busy without a break, after `first` seconds of other work."""
+    begin = first + sum(task.work_s for task in tasks)
+
+    def work_until(t: float) -> float:
+        waves = ((math.ceil((t + task.jitter_s) / task.period_s - _ROUNDING), task) for task in tasks)
+        return first + sum(count * task.work_s for count, task in waves)
+
+    return _fixed_point(begin, work_until)
+
+
+def _fixed_point(begin: float, follow: Callable[[float], float]) -> float:
+    """Return the smallest number from `begin` on that is its own follower; infinity if it is not found."""
+    now = begin
+    for _ in range(_ENOUGH):
+        after = follow(now)
+        if after <= now + _ROUNDING:
+            return now
+        now = after
+    return math.inf
+
+
+def _released(task: Task, t: float) -> int:
+    """Return how many waves can come in an interval, both ends included."""
+    return 1 + math.floor((t + task.jitter_s) / task.period_s + _ROUNDING)
+
+
+def _steps(task: Task, busy: float) -> list[float]:
+    """Return the moments of a busy period at which another wave can come."""
+    first = max(1, math.ceil(task.jitter_s / task.period_s))
+    last = math.floor((busy + task.jitter_s) / task.period_s)
+    return [max(0.0, number * task.period_s - task.jitter_s) for number in range(first, last + 1)]
+
+
+def _moments(tasks: Sequence[Task], busy: float) -> set[float] | None:
+    """Return all these moments; None if they are too many."""
+    if busy == math.inf or sum(busy / task.period_s for task in tasks) > _ENOUGH:
+        return None
+    return {0.0}.union(*(_steps(task, busy) for task in tasks))
+
+
+def _fifo(tasks: Sequence[Task]) -> float:
+    moments = _moments(tasks, _busy(tasks))
+    if moments is None:
+        return math.inf
+    return max(sum(_released(task, t) * task.work_s for task in tasks) - t for t in moments)
+
+
+def _priority(tasks: Sequence[Task], number: int) -> float:
+    """Waves that may come first delay it, others only by one firing that has begun."""
+    me = tasks[number]
+    others = [task for index, task in enumerate(tasks) if index != number]
+    first = [task for task in others if task.highest >= me.lowest]
+    blocking = max((task.longest_s for task in others if task.highest < me.lowest), default=0.0)
+    if utilisation([*first, me]) > 1 + _ROUNDING:
+        return math.inf
+    busy = _busy([*first, me], blocking)
+    if busy == math.inf:
+        return math.inf
+    last = me.firings_s[-1] if me.firings_s else 0.0
+    worst = 0.0
+    for job in range(max(1, min(math.ceil((busy + me.jitter_s) / me.period_s), _ENOUGH))):
+        own = blocking + (job + 1) * me.work_s - last
+        begun = _fixed_point(
+            own,
+            lambda t, own=own: own + sum(_released(task, t) * task.work_s for task in first),  # type: ignore[misc]
+        )
+        worst = max(worst, begun + last - job * me.period_s + me.jitter_s)
+    return worst
+
+
+def _meets_deadlines(tasks: Sequence[Task], busy: float) -> bool:
+    """Return whether each wave is over by its deadline: no interval holds more work than time."""
+    if any(task.deadline_s == math.inf for task in tasks):
+        return False
+    if busy == math.inf or sum(busy / task.period_s for task in tasks) > _ENOUGH:
+        return False
+    moments = {
+        number * task.period_s + task.deadline_s - task.jitter_s
+        for task in tasks
+        for number in range(math.floor((busy + task.jitter_s) / task.period_s) + 1)
+    }
+    moments |= {task.deadline_s for task in tasks}
+    return all(_demand(tasks, t) <= t + _ROUNDING for t in moments if t >= 0)
+
+
+def _demand(tasks: Sequence[Task], t: float) -> float:
+    """Return the work that begins and must end in an interval, and a firing that has begun before."""
+    blocking = max((task.longest_s for task in tasks if task.deadline_s > t), default=0.0)
+    return blocking + sum(
+        max(0, 1 + math.floor((t + task.jitter_s - task.deadline_s) / task.period_s + _ROUNDING)) * task.work_s
+        for task in tasks
+    )
