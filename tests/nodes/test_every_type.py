@@ -17,6 +17,8 @@ from hfg.testing import Trial
 from hfg.testing.usable import try_all
 
 NEEDS: dict[str, str] = {
+    "hfg.nodes.estimation:KalmanFilter": "a measurement of the size of its matrices",
+    "hfg.nodes.estimation:OmniTwist": "a speed for each of its wheels",
     "hfg.nodes.links:Publish": "a graph around it, which says the type",
     "hfg.nodes.links:Subscribe": "a graph around it, which says the type",
     "hfg.nodes.video:Camera": "a camera",
@@ -67,7 +69,7 @@ def test_every_real_number_has_a_unit_or_is_declared_a_plain_number(library: Cat
         if holds_reals(spec.type) and not spec.unit
     ]
     assert not missing, "\n".join(missing)
-    assert _units(library) <= {"1", "s", "1/s", "m", "px", "rad", "deg", "mm", "Hz", "m/s", "rad/s"} | OF
+    assert _units(library) <= {"1", "s", "1/s", "m", "px", "rad", "deg", "mm", "Hz", "m/s", "rad/s", "m/s^2"} | OF
 
 
 OF = {"of the value", "of the result", "of the points", "of the command", "of the pixel, squared"}

@@ -1,0 +1,37 @@
+"""Estimation: Kalman filters, tracks of many targets, odometry of wheels and of an IMU.
+
+_kalman     predict, correct, KalmanFilter, AlphaBeta
+_tracks     TrackPoints, which needs SciPy
+_odometry   twists of differential, omnidirectional and Ackermann drives, IntegrateTwist, FuseGyro
+"""
+
+from __future__ import annotations
+
+from hfg.nodes.estimation._kalman import AlphaBeta, KalmanFilter, correct, predict
+from hfg.nodes.estimation._odometry import (
+    FuseGyro,
+    IntegrateTwist,
+    OmniTwist,
+    Twist,
+    ackermann_twist,
+    differential_twist,
+    moved_by,
+)
+from hfg.nodes.estimation._tracks import PointTracks, Track, TrackPoints
+
+__all__ = [
+    "AlphaBeta",
+    "FuseGyro",
+    "IntegrateTwist",
+    "KalmanFilter",
+    "OmniTwist",
+    "PointTracks",
+    "Track",
+    "TrackPoints",
+    "Twist",
+    "ackermann_twist",
+    "correct",
+    "differential_twist",
+    "moved_by",
+    "predict",
+]
