@@ -50,14 +50,20 @@ class Layouts:
         for key in [key for key in self._made if key not in {one.key for one in self._wanted}]:
             del self._made[key]
             self._host.take_layout(key, None)
+        self._begin()
+
+    def _begin(self) -> None:
         if self._working is None and self._next() is not None:
             self._working = asyncio.create_task(self._work(), name="hfg studio layout")
             self._working.add_done_callback(self._worked)
 
     def _worked(self, task: asyncio.Task[None]) -> None:
         self._working = None
-        if not task.cancelled() and task.exception() is not None:
+        if task.cancelled():
+            return
+        if task.exception() is not None:
             _LOGGER.error("a level cannot be laid out", exc_info=task.exception())
+        self._begin()  # levels are left if that was an error, and some were wanted since the task has ended
 
     def _next(self) -> tuple[Shown, object] | None:
         """Return a level that is not drawn as it is, and what its layout depends on."""

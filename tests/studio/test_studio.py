@@ -11,7 +11,11 @@ from annotated_types import Ge
 
 import hfg
 from hfg.graph.structure.level import level_of
+from hfg.studio.layouts import Layouts
+from hfg.studio.viewing import Shown
+from tests.limits import patience
 from tests.studio.page import Page, live, studio_of, tables_of
+from tests.studio.stories.graphs import mission
 
 HERE = "tests.studio.test_studio"
 
@@ -594,6 +598,28 @@ def test_a_level_that_a_page_shows_is_laid_out_and_follows_edits() -> None:
         assert (scaled["x"], scaled["y"]) == (800, 160)
         page.say(t="level", path="", open=False)
         assert page.tables["layouts"] == {}
+
+    live(main)
+
+
+def test_a_level_is_laid_out_even_if_it_is_wanted_just_when_another_one_is_done() -> None:
+    async def main() -> None:
+        studio = studio_of(mission())
+        Page(studio).join()  # now the graph is described
+        done: asyncio.Queue[str] = asyncio.Queue()
+
+        class Host:
+            tables, graph = studio.tables, studio.graph
+
+            def take_layout(self, key: str, record: object) -> None:
+                if done.empty():  # the task ends now, and nobody has seen it yet
+                    asyncio.get_running_loop().call_soon(layouts.want, [Shown(), Shown("errand")])
+                done.put_nowait(key)
+
+        layouts = Layouts(Host())
+        layouts.want([Shown()])
+        async with asyncio.timeout(patience(10)):
+            assert [await done.get(), await done.get()] == [":", ":errand"]
 
     live(main)
 
