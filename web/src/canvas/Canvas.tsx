@@ -1,6 +1,6 @@
 import "@xyflow/react/dist/base.css";
 import { Background, BackgroundVariant, ReactFlow, ReactFlowProvider, ViewportPortal } from "@xyflow/react";
-import { useMemo, useRef } from "react";
+import { memo, type ReactNode, type RefObject, useMemo, useRef } from "react";
 import { change, layoutKey, useStudio } from "../state/studio";
 import type { LayoutRecord } from "../protocol/types";
 import { enter } from "../state/actions";
@@ -10,7 +10,7 @@ import { AskedWires } from "./AskedWires";
 import { Annotations } from "./Annotations";
 import { FarOverlay } from "./FarOverlay";
 import { MovedWires } from "./MovedWires";
-import { NodeView } from "./NodeView";
+import { type HfgNode, NodeView } from "./NodeView";
 import { Tags } from "./Tags";
 import { useCanvasEvents } from "./useCanvasEvents";
 import { useNodes } from "./useNodes";
@@ -18,7 +18,7 @@ import { useView } from "./useView";
 import { ValueTip } from "./ValueTip";
 import { WireDrag } from "./WireDrag";
 import { Wires } from "./Wires";
-import { spotsOf } from "./wiring";
+import { type Spot, spotsOf } from "./wiring";
 import { Mini, Zoomer } from "./Zoomer";
 
 const NODE_TYPES = { hfg: NodeView };
@@ -34,15 +34,14 @@ export function Canvas() {
 function Inner() {
   const root = useRef<HTMLElement>(null);
   const layout = useStudio((s) => s.tables.layouts[layoutKey(s)]);
-  const wiring = useStudio((s) => s.wire !== null);
-  const spots = useMemo(() => (layout ? spotsOf(layout) : new Map()), [layout]);
+  const spots = useMemo(() => (layout ? spotsOf(layout) : NO_SPOTS), [layout]);
   const { nodes, moved, onNodesChange, onDragStart, onDrag, onDragStop } = useNodes(layout);
   const hands = useMemo(() => new Map(nodes.filter((one) => moved.has(one.id)).map((one) => [one.id, one.position])), [nodes, moved]);
   const view = useView(root, layout);
   const events = useCanvasEvents(spots, layout);
-  const classes = [view.level, wiring && "wiring", view.partly && "partly", layout?.view === "activity" && "view-activity"];
+  const classes = [view.level, view.partly && "partly", layout?.view === "activity" && "view-activity"].filter(Boolean).join(" ");
   return (
-    <main id="canvas" ref={root} className={classes.filter(Boolean).join(" ")} aria-label="Graph" tabIndex={-1} {...events}>
+    <Ground root={root} classes={classes} events={events}>
       <ReactFlow
         nodes={nodes}
         edges={NO_EDGES}
@@ -53,11 +52,8 @@ function Inner() {
         onNodeDragStop={onDragStop}
         onSelectionDragStart={(event, dragged) => onDragStart(event, dragged[0]!, dragged)}
         onSelectionDragStop={(event, dragged) => onDragStop(event, dragged[0]!, dragged)}
-        onNodeDoubleClick={(_, node) => {
-          if (node.data.box.kind === "subgraph") enter(node.id);
-          else change({ renaming: node.id });
-        }}
-        onPaneClick={() => change({ selectedEdge: null, annotation: null, menu: null })}
+        onNodeDoubleClick={open}
+        onPaneClick={unpick}
         onMove={view.onMove}
         onMoveEnd={view.onMoveEnd}
         minZoom={0.02}
@@ -99,7 +95,7 @@ function Inner() {
       {layout?.view === "activity" && <ActivityLegend layout={layout} />}
       <Zoomer showAll={view.showAll} />
       {layout?.nodes.length === 0 && <NothingHere />}
-    </main>
+    </Ground>
   );
 }
 
@@ -111,12 +107,36 @@ function NothingHere() {
 }
 
 const NO_EDGES: never[] = [];
+const NO_SPOTS: Map<string, Spot> = new Map();
+const unpick = () => change({ selectedEdge: null, annotation: null, menu: null });
+
+function open(_: unknown, node: HfgNode): void {
+  if (node.data.box.kind === "subgraph") enter(node.id);
+  else change({ renaming: node.id });
+}
+
+interface GroundProps {
+  root: RefObject<HTMLElement | null>;
+  classes: string;
+  events: ReturnType<typeof useCanvasEvents>;
+  children: ReactNode;
+}
+
+/** It knows of a wire that is being drawn, so that nothing on it is drawn again when one begins or ends. */
+function Ground({ root, classes, events, children }: GroundProps) {
+  const wiring = useStudio((s) => s.wire !== null);
+  return (
+    <main id="canvas" ref={root} className={wiring ? `${classes} wiring` : classes} aria-label="Graph" tabIndex={-1} {...events}>
+      {children}
+    </main>
+  );
+}
 const SNAP: [number, number] = [8, 8];
 const MULTI = ["Control", "Meta", "Shift"];
 const PRO = { hideAttribution: false };
 
 /** What the lines of this view mean, and how much it leaves out. */
-function ActivityLegend({ layout }: { layout: LayoutRecord }) {
+const ActivityLegend = memo(function ActivityLegend({ layout }: { layout: LayoutRecord }) {
   const all = useStudio((s) => Object.values(s.tables.edges).filter((one) => one.level === s.level || (layout.deep && isInside(one.level, s.level))).length);
   return (
     <div className="legend" style={{ right: 12, bottom: "auto", top: 12 }}>
@@ -142,4 +162,4 @@ function ActivityLegend({ layout }: { layout: LayoutRecord }) {
       </span>
     </div>
   );
-}
+});

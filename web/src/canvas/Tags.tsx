@@ -1,9 +1,9 @@
-import { useState } from "react";
+import { memo, useState } from "react";
 import type { LayoutRecord, LayoutTag } from "../protocol/types";
 import { useStudio } from "../state/studio";
 
 /** A port of the level itself is a tag at each place where it is used; hover lights up all of one name. */
-export function Tags({ layout }: { layout: LayoutRecord }) {
+export const Tags = memo(function Tags({ layout }: { layout: LayoutRecord }) {
   const level = useStudio((s) => s.level);
   const [lit, setLit] = useState<readonly string[]>([]);
   const tags = new Map<string, { tag: LayoutTag; dashed: boolean }>();
@@ -28,7 +28,7 @@ export function Tags({ layout }: { layout: LayoutRecord }) {
       ))}
     </>
   );
-}
+});
 
 function innerPort(level: string, port: string): string {
   if (level === "") return port;

@@ -17,7 +17,6 @@ export function WireDrag({ spots }: { spots: Map<string, Spot> }) {
   const start: [number, number] = from ? [from.x, from.y] : [wire.point.x, wire.point.y];
   const end: [number, number] = over ? [over.x, over.y] : [wire.point.x, wire.point.y];
   const upright = from?.kind === "event" || from?.kind === "slot" || from?.kind === "timeout";
-  const offset = document.getElementById("canvas")?.getBoundingClientRect() ?? new DOMRect();
   const [a, b] = isSource(wire.from) ? [start, end] : [end, start];
   const refused = fit?.fit === "refused";
   return (
@@ -32,7 +31,7 @@ export function WireDrag({ spots }: { spots: Map<string, Spot> }) {
       </ViewportPortal>
       <DragLine from={wire.from} targets={wire.targets} />
       {fit && wire.over !== null && (
-        <Reason port={wire.over} fit={fit} x={wire.screen.x - offset.x} y={wire.screen.y - offset.y} active={wire.active} />
+        <Reason port={wire.over} fit={fit} screen={wire.screen} active={wire.active} />
       )}
     </>
   );
@@ -63,9 +62,10 @@ function DragLine({ from, targets }: { from: string; targets: Targets | null }) 
   );
 }
 
-function Reason({ port, fit, x, y, active }: { port: string; fit: Fit; x: number; y: number; active: boolean }) {
+function Reason({ port, fit, screen, active }: { port: string; fit: Fit; screen: { x: number; y: number }; active: boolean }) {
   const name = `${nameOf(nodeOf(port))}.${portOf(port)}`;
-  const style = { left: Math.max(8, x - 24), top: y + 24 };
+  const offset = document.getElementById("canvas")?.getBoundingClientRect() ?? new DOMRect();
+  const style = { left: Math.max(8, screen.x - offset.x - 24), top: screen.y - offset.y + 24 };
   if (fit.fit === "refused") {
     return (
       <div className="pop reason no" style={style} role="alert">

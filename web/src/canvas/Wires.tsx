@@ -9,16 +9,27 @@ import { type Strand, spread } from "./spreading";
 import { useZoom } from "./useView";
 import type { Spot } from "./wiring";
 
-export const keysOf = (line: LayoutLine): string[] => line.edges.map((edge) => edgeKey(edge.source, edge.target));
+const keys = new WeakMap<LayoutLine, string[]>();
+
+/** The keys of the edges of a line. */
+export function keysOf(line: LayoutLine): string[] {
+  const known = keys.get(line);
+  if (known) return known;
+  const made = line.edges.map((edge) => edgeKey(edge.source, edge.target));
+  keys.set(line, made);
+  return made;
+}
+
+const NONE: ReadonlySet<string> = new Set();
 
 /** All lines of a level, exactly as the layout routes them: data below, activity above, its last way on top. */
-export function Wires({ layout, moved, spots }: { layout: LayoutRecord; moved: ReadonlySet<string>; spots: ReadonlyMap<string, Spot> }) {
+export const Wires = memo(function Wires({ layout, moved, spots }: { layout: LayoutRecord; moved: ReadonlySet<string>; spots: ReadonlyMap<string, Spot> }) {
   const ways = useStudio((s) => s.activity.ways);
   const picked = useStudio((s) => s.insertAt ?? s.selectedEdge);
   const nodes = useStudio((s) => s.tables.nodes);
   const full = useWaits((s) => s.edges);
   const near = useZoom((s) => s.level === "near");
-  const selection = useStudio((s) => s.selection);
+  const selection = useStudio((s) => (near ? s.selection : NONE));
   const [over, setOver] = useState<string | null>(null);
   const lines = layout.lines.filter((line) => !line.edges.some((e) => moved.has(nodeOf(e.source)) || moved.has(nodeOf(e.target))));
   const draw = (line: LayoutLine) => {
@@ -51,7 +62,7 @@ export function Wires({ layout, moved, spots }: { layout: LayoutRecord; moved: R
       <Pulses layout={layout} />
     </svg>
   );
-}
+});
 
 const NO_STRANDS: Strand[] = [];
 

@@ -7,6 +7,8 @@ import { edgeUnder, insert, markEdgeUnder } from "./inserting";
 import type { HfgNode } from "./NodeView";
 
 const NOTHING: ReadonlySet<string> = new Set();
+/** React Flow need not measure a node whose size and handles it is told, so it does not mount those out of sight. */
+const NO_HANDLES: [] = [];
 
 function made(layout: LayoutRecord, selection: ReadonlySet<string>): HfgNode[] {
   return layout.nodes.map((box) => ({
@@ -16,6 +18,8 @@ function made(layout: LayoutRecord, selection: ReadonlySet<string>): HfgNode[] {
     data: { box, plain: layout.view === "activity" },
     width: box.width,
     height: box.height,
+    measured: { width: box.width, height: box.height },
+    handles: NO_HANDLES,
     selected: selection.has(box.id),
     deletable: false,
     connectable: false,
@@ -32,16 +36,18 @@ export function useNodes(layout: LayoutRecord | undefined) {
   const [moved, setMoved] = useState<ReadonlySet<string>>(NOTHING);
   const dragging = useRef(false);
 
-  useEffect(() => {
-    if (dragging.current) return;
-    setNodes(layout ? made(layout, studio().selection) : []);
-    setMoved(NOTHING);
-  }, [layout]);
+  const [shown, setShown] = useState<LayoutRecord>();
+  if (layout !== shown) {
+    setShown(layout); // while it is drawn, not in an effect after it: the nodes of the level before are not drawn once more
+    if (!dragging.current) {
+      setNodes(layout ? made(layout, selection) : []);
+      setMoved(NOTHING);
+    }
+  }
 
   useEffect(() => {
-    setNodes((before) =>
-      before.map((node) => (node.selected === selection.has(node.id) ? node : { ...node, selected: selection.has(node.id) })),
-    );
+    const isRight = (node: HfgNode) => node.selected === selection.has(node.id);
+    setNodes((before) => (before.every(isRight) ? before : before.map((node) => (isRight(node) ? node : { ...node, selected: selection.has(node.id) }))));
   }, [selection]);
 
   const onNodesChange = useCallback((changes: NodeChange<HfgNode>[]) => {

@@ -50,20 +50,25 @@ interface Known {
   edges: unknown;
   until: number;
   targets: Promise<Targets>;
+  /** Once they are here. */
+  answer: Targets | null;
 }
 
 /** What an edge from the port under the mouse may lead to. */
 let known: Known | null = null;
 const KNOWN_MS = 3000;
 
-function targetsOf(from: string, moving: string): Promise<Targets> {
+function targetsOf(from: string, moving: string): Known {
   const { edges } = studio().tables;
   const now = performance.now();
-  if (known?.from === from && known.moving === moving && known.edges === edges && now < known.until) return known.targets;
-  const targets = question<Targets>("targets", { port: from, moving });
-  known = { from, moving, edges, until: now + KNOWN_MS, targets };
-  targets.catch(() => (known = null));
-  return targets;
+  if (known?.from === from && known.moving === moving && known.edges === edges && now < known.until) return known;
+  const one: Known = { from, moving, edges, until: now + KNOWN_MS, targets: question<Targets>("targets", { port: from, moving }), answer: null };
+  known = one;
+  one.targets.then(
+    (answer) => (one.answer = answer),
+    () => (known = null),
+  );
+  return one;
 }
 
 const REST_MS = 60;
@@ -73,7 +78,7 @@ let resting = 0;
 export function restOn(port: string, kind: string): void {
   clearTimeout(resting);
   if (port === "" || locked() !== "" || studio().wire) return;
-  resting = window.setTimeout(() => void targetsOf(...beginOf(port, kind)).catch(() => undefined), REST_MS);
+  resting = window.setTimeout(() => void targetsOf(...beginOf(port, kind)), REST_MS);
 }
 
 /** Where a wire from a port begins, and which edge it moves. */
@@ -90,9 +95,14 @@ export async function beginWire(port: string, kind: string, at: { x: number; y: 
     return;
   }
   const [from, moving] = beginOf(port, kind);
-  change({ wire: { from, moving, targets: null, over: null, point: at, screen, active: false } });
+  const found = targetsOf(from, moving);
+  change({ wire: { from, moving, targets: found.answer, over: null, point: at, screen, active: false } });
+  if (found.answer) {
+    light(found.answer, from);
+    return;
+  }
   try {
-    const targets = await targetsOf(from, moving);
+    const targets = await found.targets;
     const wire = studio().wire;
     if (wire?.from !== from) return;
     change({ wire: { ...wire, targets } });
@@ -135,7 +145,7 @@ export const fitOf = (port: string | null): Fit | undefined =>
 
 /** What a wire may lead to; who drops it at once may be faster than the studio. */
 const answerFor = (wire: WireDrag): Promise<Targets | null> =>
-  wire.targets ? Promise.resolve(wire.targets) : targetsOf(wire.from, wire.moving).catch(() => null);
+  wire.targets ? Promise.resolve(wire.targets) : targetsOf(wire.from, wire.moving).targets.catch(() => null);
 
 /** Drop: connect, move, cut, or choose what lies between. */
 export async function dropWire(place: { x: number; y: number }): Promise<void> {

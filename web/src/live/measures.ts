@@ -1,5 +1,6 @@
 import { type Measure, readMeasures } from "../protocol/frames";
 import { socket } from "../state/link";
+import { givesWay } from "../ui/giving";
 
 /** Measured figures live outside of React: thirty times a second they go straight to the painters of visible nodes. */
 type Painter = (measure: Measure, slow: boolean) => void;
@@ -10,6 +11,7 @@ let order: string[] = [];
 let subscription: ReturnType<typeof socket.subscribe> | null = null;
 let scheduled = 0;
 let lastSlow = 0;
+let lastPainted = 0;
 
 /** Texts change at most four times a second, bars as often as they come. */
 const SLOW_MS = 250;
@@ -49,6 +51,8 @@ function subscribe(): void {
 function heard(measures: Measure[]): void {
   if (measures.length !== order.length) return; // it answers what was wanted before
   const now = performance.now();
+  if (givesWay(lastPainted)) return; // the next frame has newer ones
+  lastPainted = now;
   const slow = now - lastSlow >= SLOW_MS;
   if (slow) lastSlow = now;
   measures.forEach((measure, index) => {

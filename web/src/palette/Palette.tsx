@@ -10,8 +10,25 @@ import { Rows } from "./Rows";
 const WIDTH = 648;
 const HEIGHT = 404;
 
+/** What it shows when it opens, as the studio said last: one sees it at once, and then what the studio says now. */
+let first: Found | null = null;
+const FIRST_MS = 1500;
+
+const searched = (words: string, port: string): Promise<Found> => question<Found>("search", { words, port, category: "", most: 50 });
+
+function keepFirst(found: Found): Found {
+  if (JSON.stringify(found) !== JSON.stringify(first)) first = found;
+  return first!;
+}
+
 export function Palette() {
   const at = useStudio((s) => (s.popover === "palette" ? s.palette : null));
+  const open = useStudio((s) => s.phase === "open");
+  useEffect(() => {
+    if (!open) return;
+    const timer = setTimeout(() => void searched("", "").then(keepFirst, () => undefined), FIRST_MS);
+    return () => clearTimeout(timer);
+  }, [open]);
   return at && <PaletteAtPlace key={`${at.screen.x} ${at.screen.y} ${at.port}`} at={at} />;
 }
 
@@ -19,8 +36,10 @@ export function Palette() {
 function PaletteAtPlace({ at }: { at: PaletteAt }) {
   const [words, setWords] = useState(at.words);
   const [port, setPort] = useState(at.port);
-  const [found, setFound] = useState<Found | null>(null);
-  const [answered, setAnswered] = useState<string | null>(null);
+  const early = at.words === "" && at.port === "" ? first : null;
+  const [found, setFound] = useState<Found | null>(early);
+  const [answered, setAnswered] = useState<string | null>(early && "");
+  const last = useRef(early && { words: "", port: "" });
   const [index, setIndex] = useState(0);
   /** Words for which somebody has pressed Enter before their answer came: its first row is added once it does. */
   const entered = useRef<{ words: string; connected: boolean } | null>(null);
@@ -32,9 +51,11 @@ function PaletteAtPlace({ at }: { at: PaletteAt }) {
     const ask = async (asked: { words: string; port: string }) => {
       state.busy = true; // one search at a time: who types fast is not interested in those between
       try {
-        setFound(await question<Found>("search", { ...asked, category: "", most: 50 }));
+        const answer = await searched(asked.words, asked.port);
+        setFound(asked.words === "" && asked.port === "" ? keepFirst(answer) : answer);
         setAnswered(asked.words);
-        setIndex(0);
+        if (last.current?.words !== asked.words || last.current.port !== asked.port) setIndex(0);
+        last.current = asked;
       } catch (error) {
         toast(error instanceof Error ? error.message : String(error), { kind: "bad" });
       }

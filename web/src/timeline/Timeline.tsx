@@ -4,6 +4,7 @@ import { show, select } from "../state/actions";
 import { parentOf } from "../state/paths";
 import { studio, useStudio } from "../state/studio";
 import { drawTimeline, GUTTER, overviewTimeAt, scale, targets, timeAt } from "./draw";
+import { givesWay } from "../ui/giving";
 import { record, useWindow, watchTimeline } from "./store";
 
 const LEAST_S = 0.02;
@@ -18,8 +19,12 @@ export function Timeline() {
   useEffect(() => watchTimeline(run), [run]);
   useEffect(() => {
     if (canvas.current) drawTimeline(canvas.current, true);
+    let painted = performance.now();
     let request = requestAnimationFrame(function frame() {
-      if (canvas.current) drawTimeline(canvas.current);
+      if (canvas.current && (record.cursor !== null || !givesWay(painted))) {
+        drawTimeline(canvas.current);
+        painted = performance.now();
+      }
       if (canvas.current && record.cursor !== null) noteTimes(canvas.current);
       request = requestAnimationFrame(frame);
     });
