@@ -78,9 +78,12 @@ class Sent(Formula):
 
     port: str
     when: Callable[[Any], object] | None = None
+    older_than_s: float | None = None
 
     def __str__(self) -> str:
-        return f"sent({_quoted(self.port)}" + (")" if self.when is None else f", {_named(self.when)})")
+        said = "" if self.when is None else f", {_named(self.when)}"
+        said += "" if self.older_than_s is None else f", older_than_s={plain_number(self.older_than_s)}"
+        return f"sent({_quoted(self.port)}{said})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,19 +203,23 @@ def active(node: Any) -> Formula:
     return Active(_path(node, "active", "a node"))
 
 
-def sent(port: Any, when: Callable[[Any], object] | str | None = None) -> Formula:
+def sent(port: Any, when: Callable[[Any], object] | str | None = None, *, older_than_s: float | None = None) -> Formula:
     """A value passes a port now: an output sends it, an event is triggered with it, a slot or input is given it.
 
     Args:
       port: the port, or its path, such as "camera.image".
       when: a condition for the value, as a function or as text, "value > 3"; by default any value will do. Markers
         (NO_MESSAGE, END) are not values.
+      older_than_s: only if its stamp is older than that; so `never(sent("steer.found", older_than_s=0.05))` is a
+        deadline from the source, whose firing gave the stamp (rule T5), to this port.
     """
     if isinstance(when, str):
         when = parse_condition(when)
     if when is not None and not callable(when):
         raise UsageError(f"sent({port!r}, ...) takes a condition, such as lambda value: value > 3, got {when!r}")
-    return Sent(_path(port, "sent", "a port"), when)
+    if older_than_s is not None:
+        older_than_s, _ = _bounds("sent", older_than_s, math.inf)
+    return Sent(_path(port, "sent", "a port"), when, older_than_s)
 
 
 def fired(node: Any) -> Formula:

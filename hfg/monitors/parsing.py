@@ -136,12 +136,27 @@ class _Reading(ConditionReading):
 
     def atom(self, name: Token) -> Formula:
         path = self.path(name.text)
-        when = None
-        if name.text == "sent" and self.is_next(","):
-            self.take()
-            when = self.nested(self.condition)
+        if name.text == "sent":
+            return self.sent(name, path)
         self.need(")", f"at the end of {name.text}(...)")
-        return f.Sent(path, when) if name.text == "sent" else f.active(path) if name.text == "active" else f.fired(path)
+        return f.active(path) if name.text == "active" else f.fired(path)
+
+    def sent(self, name: Token, path: str) -> Formula:
+        """Read what follows the port: a condition, an age, both or nothing."""
+        when, older_than_s = None, None
+        while older_than_s is None and self.is_next(","):
+            self.take()
+            if self.is_next("older_than_s"):
+                self.take()
+                self.need("=", 'after "older_than_s"')
+                older_than_s = self.number()
+            elif when is None:
+                when = self.nested(self.condition)
+            else:
+                found = self.next()
+                self.wrong(found.at, f"sent takes older_than_s= here, got {shown(found)}")
+        self.need(")", "at the end of sent(...)")
+        return self.made(name, lambda: f.sent(path, when, older_than_s=older_than_s))
 
     def at_least(self, name: Token) -> Formula:
         at, number = self.next().at, self.number()

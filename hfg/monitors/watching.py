@@ -271,9 +271,16 @@ class _Watch:
                 found.setdefault(f"{atom.node}.processed", []).append((number, None))
         return [(port, self._look(port, atoms)) for port, atoms in found.items()]
 
+    def _age(self, number: int) -> float | None:
+        """Return how old a token must be for an atom; exactly that old is not older, whatever is lost by rounding."""
+        atom = self.judge.atoms[number]
+        is_aged = isinstance(atom, Sent) and atom.older_than_s is not None
+        return atom.older_than_s + _JUST_AFTER_S if is_aged else None  # type: ignore[union-attr,operator]
+
     def _look(self, port: str, atoms: list[tuple[int, Callable[[Any], object] | None]]) -> Callable[[Token[Any]], None]:
         truths, append, point, now = self._truths, self.ring.append, self.judge.point, self._monitors.now
         numbers = [number for number, _ in atoms]
+        ages = [(number, older) for number in numbers if (older := self._age(number)) is not None]
 
         def put(token: Token[Any]) -> None:
             value = token.value
@@ -287,6 +294,8 @@ class _Watch:
                 self._monitors._break(self, error)
                 return
             t = now()
+            for number, older in ages:
+                truths[number] = truths[number] and t - token.stamp > older
             append((t, port, value if kind in _KEPT else kind))
             if point(t, *truths):
                 self._monitors._violated(self, t)

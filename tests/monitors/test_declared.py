@@ -14,7 +14,7 @@ from hfg import monitors as m
 from hfg.errors import CheckFailed, FileError, GraphError, MonitorViolated, UsageError
 from hfg.files import build, describe, text_of
 from hfg.files.building import load
-from tests.monitors.test_watching import chain, lit
+from tests.monitors.test_watching import chain, lit, sink, ticks
 
 
 def texts(graph: hfg.Graph) -> dict[str, str]:
@@ -228,6 +228,26 @@ def test_a_library_of_boxes_declares_monitors_once() -> None:
     for _ in range(2):
         graph.monitor("few", "never(sent(ticks.out, value == 4))")
     assert list(graph.monitors) == ["few"]
+
+
+@hfg.node
+async def slowly(number: int) -> int:
+    """The longer, the larger the number."""
+    await asyncio.sleep(number / 10)
+    return number
+
+
+@pytest.mark.rule("T5")
+def test_a_deadline_from_a_source_is_a_monitor_of_the_age_of_its_tokens() -> None:
+    graph = hfg.Graph("late")
+    source, work = graph.add(ticks(), max_rate_hz=1), graph.add(slowly())
+    graph.connect(source.out, work.number)
+    graph.connect(work.out, graph.add(sink()).number)
+    graph.monitor("fast", "never(sent(sink.number, older_than_s=0.5))")
+    graph.monitor("small", "never(sent(sink.number, value < 8, older_than_s=0.6))")
+    _, found = watched(graph)
+    assert [(one.monitor, one.stretch[-1].value) for one in found.violations] == [("fast", 6), ("small", 7)]
+    assert build(describe(graph)).monitors == graph.monitors
 
 
 @pytest.mark.rule("L1")

@@ -29,6 +29,7 @@ def test_what_a_property_prints_is_read_as_the_same_property(block: int) -> None
         "never(active(robot/drive) & sent(robot/drive.lamp[0], value == true))",
         'always(sent(door.state, value.name == "open" | ~value.locked & value.count[1] >= -2.5))',
         'leads_to(fired("go home"), sent(a.b), within_s=0.1234567)',
+        "never(sent(steer.found, value > 3, older_than_s=0.05) | sent(steer.found, older_than_s=1))",
         "precedes(previously(active(a)), at_least(3, fired(b), within_s=1e-07))",
     ],
 )
@@ -77,6 +78,8 @@ MALFORMED = {
     "never(sent(a.b, 3 < value))": "column 17: a condition begins with value",
     "never(once(active(a), within=3))": "column 23: once takes within_s= and at_least_s= here",
     "never(once(active(a), within_s=-3))": "column 7: once looks back by seconds from 0 on",
+    "never(sent(a.b, value, value))": "column 24: sent takes older_than_s= here",
+    "never(sent(a.b, older_than_s=-1))": "column 7: sent looks back by seconds from 0 on",
     "leads_to(active(a))": 'column 19: "," is expected between the formulas of leads_to',
     "never(at_least(1.5, active(a)))": "column 16: at_least counts points, got 1.5",
     'never(active("a\\q"))': 'column 14: ""a\\q"" has a "\\" that means nothing',
