@@ -230,6 +230,14 @@ def test_a_library_of_boxes_declares_monitors_once() -> None:
     assert list(graph.monitors) == ["few"]
 
 
+@pytest.mark.parametrize("format_", ["svg", "mmd", "dot"])
+def test_a_drawing_shows_the_monitors_at_the_nodes_that_they_name(format_: Any) -> None:
+    graph = lit()
+    assert "monitor dark" not in graph.draw(format=format_)
+    graph.monitor("dark", "never(active(box/state) & sent(ticks.out, value == 4))")
+    assert graph.draw(format=format_, depth=5).count("monitor dark") in (2, 4)  # in an SVG in the tooltips, too
+
+
 @hfg.node
 async def slowly(number: int) -> int:
     """The longer, the larger the number."""

@@ -14,10 +14,12 @@ from hfg.graph.drawing.seen import EVERYTHING, Arrow, Look, Picture, Pin, Shape,
 from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, end_path, is_feed, is_port
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import HasLevel, Level, inside, level_of
+from hfg.graph.structure.monitors import node_part
 from hfg.graph.structure.naming import path_of
 from hfg.graph.structure.option import declared
 from hfg.graph.structure.options import EdgeOptions, NodeOptions
 from hfg.graph.structure.subgraph import is_box
+from hfg.monitors.formulas import Sent
 from hfg.nodetypes.description import NodeType
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, Port
@@ -38,6 +40,7 @@ class _Look:
         self.view = view
         self.open, self.hidden_in = _opened(level, view)
         self.lit = _lit(level, view)
+        self.monitors = _monitors(level)
         self.picture = Picture(level.path or level.name, [], [], list(level.whole.groups.by_name))
         self.ids: dict[object, str] = {}  # of nodes, and of ports that are drawn by themselves
         self.shapes: dict[str, Shape] = {}
@@ -119,7 +122,7 @@ class _Look:
             id_,
             name,
             look,
-            _details(options, node._type),
+            _details(options, node._type) + self.monitors.get(path_of(node), []),
             path_of(node),
             node._type.qualname,
             group,
@@ -284,6 +287,16 @@ def _declared(node: Node) -> dict[tuple[str, str], int]:
 
 
 # --- labels ---
+
+
+def _monitors(level: Level) -> dict[str, list[str]]:
+    """Return what a drawing shows of monitors, by the path of each node that they name."""
+    found: dict[str, list[str]] = {}
+    for name, spec in level.whole.monitors.items():
+        paths = (atom.port if isinstance(atom, Sent) else atom.node for atom in spec.property.atoms())
+        for path in dict.fromkeys(map(node_part, paths)):
+            found.setdefault(path, []).append(f"monitor {name}")
+    return found
 
 
 def _details(options: NodeOptions, kind: NodeType) -> list[str]:
