@@ -11,6 +11,7 @@ import pytest
 import hfg
 from hfg import commands
 from hfg.errors import FileError, GraphError, MonitorViolated
+from hfg.graph.structure import facts
 from hfg.testing import explore
 
 Play = Callable[..., None]
@@ -233,6 +234,14 @@ def test_commands_rebuild_facts() -> None:
 def test_a_fact_that_is_stated_twice_is_one() -> None:
     graph = build("at_most_one", "at_most_one")
     assert len(graph.facts) == 1
+
+
+@pytest.mark.rule("L4")
+def test_a_graph_states_at_most_so_many_facts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(facts, "MOST_FACTS", 1)
+    graph = build("at_most_one")
+    with pytest.raises(GraphError, match="states 1 facts already, as many as are allowed"):
+        graph.exactly_one("one", "two")
 
 
 def test_bad_facts_are_refused_with_the_remedy() -> None:

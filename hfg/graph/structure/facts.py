@@ -6,6 +6,7 @@ runs check them.
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Final, Literal, TypeAlias, get_args
 
 import msgspec
@@ -18,6 +19,9 @@ from hfg.graph.structure.refusals import Refusable
 from hfg.nodetypes.node import Node
 
 Claim: TypeAlias = Literal["at most one", "exactly one"]
+MOST_FACTS: Final = 1_000
+"""Each new fact is compared with all others, and a file may hold many (rule L4)."""
+
 CLAIMS: Final[tuple[Claim, ...]] = get_args(Claim)
 
 
@@ -88,9 +92,14 @@ def refuse_fact(level: Level, fact: Fact) -> None:
         raise GraphError(
             f"{method} needs two nodes or more, or a subgraph, got {len(fact.nodes)}: name all that take turns"
         )
-    if len(set(fact.nodes)) < len(fact.nodes):
-        twice = next(node for node in fact.nodes if fact.nodes.count(node) > 1)
+    twice = next((node for node, count in Counter(fact.nodes).items() if count > 1), None)
+    if twice is not None:
         raise GraphError(f'{method} names "{path_of(twice)}" twice; name it once')
+    if len(level.whole.facts) >= MOST_FACTS:
+        raise GraphError(
+            f"{level.whole.root.title} states {MOST_FACTS:,} facts already, as many as are allowed: name a subgraph in "
+            "place of the nodes inside"
+        )
 
 
 def swap_in_facts(facts: list[Fact], old: Node, new: Node) -> None:
