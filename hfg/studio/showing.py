@@ -99,11 +99,12 @@ def _summary(value: Any) -> str:
 def _short(value: Any, depth: int) -> str:
     if isinstance(value, bool | np.bool_) or value is None:
         return str(value)
+    digits = 4 if depth == 0 else 3
     if isinstance(value, np.ndarray) and value.dtype.kind in "iuf":
         few = value.size <= _MOST_FIELDS
-        return f"({', '.join(f'{one:.4g}' for one in value.flat)})" if few else f"{value.size} numbers"
+        return f"({', '.join(f'{one:.{digits}g}' for one in value.flat)})" if few else f"{value.size} numbers"
     if isinstance(value, float | np.floating):
-        return f"{value:.4g}"
+        return f"{value:.{digits}g}"
     if isinstance(value, str) and depth == 0:
         return " ".join(value.split())
     fields = fields_of(value)

@@ -539,7 +539,7 @@ def test_values_are_short_enough_for_one_line() -> None:
     assert line(np.zeros((480, 640), np.uint8)) == "image, 640 x 480"
     assert line(np.zeros((3, 4, 5))) == "float64, 4 x 3 x 5"
     assert line(np.array([0.25, 2.0])) == "(0.25, 2)"
-    assert line(Reading(1.23456, np.zeros(9), "far")) == "level 1.235, rays 9 numbers, words 'far'"
+    assert line(Reading(1.23456, np.zeros(9), "far")) == "level 1.23, rays 9 numbers, words 'far'"
     assert line([Reading(1.0, np.zeros(9), "far")] * 3) == "3 x Reading"
     assert line(True) == "True"
 

@@ -24,10 +24,17 @@ interface Props {
 /** The ports of a node where the layout puts them: squares are synchronous, circles are not. */
 export function NodePorts({ box, path, active, limit }: Props) {
   const near = useZoom((s) => s.level === "near");
+  const tagged = useStudio((s) => (near ? taggedIn(s.tables.layouts[layoutKey(s)]) : NONE));
+  /** How many ports share the tag of one: those of a comb have one tag for all. */
+  const sharing = (port: PortSpot): number => {
+    const own = tagged.get(`${path}.${port.name}`) ?? 0;
+    if (own === 0 || port.says !== "" || !isSide(port)) return own;
+    return Math.max(own, box.ports.filter((one) => one.x === port.x && one.says === "" && tagged.has(`${path}.${one.name}`)).length);
+  };
   return (
     <>
       {box.ports.map((port) => (
-        <Port key={`${port.kind}.${port.name}`} port={port} x={port.x - box.x} y={port.y - box.y} node={path} active={active} limit={limit} near={near} room={roomOf(port, box)} />
+        <Port key={`${port.kind}.${port.name}`} port={port} x={port.x - box.x} y={port.y - box.y} node={path} active={active} limit={limit} near={near} tagged={sharing(port)} room={roomOf(port, box)} />
       ))}
     </>
   );
@@ -46,6 +53,7 @@ interface PortProps {
   active: boolean;
   limit: number | null;
   near: boolean;
+  tagged: number;
   room: number;
 }
 
@@ -58,7 +66,7 @@ function roomOf(port: PortSpot, box: NodeBox): number {
   return Math.min(WIDEST, Math.min(...right, box.x + box.width + 40) - port.x - 16);
 }
 
-function Port({ port, x, y, node, active, limit, near, room }: PortProps) {
+function Port({ port, x, y, node, active, limit, near, tagged, room }: PortProps) {
   const path = `${node}.${port.name}`;
   const broken = useStudio((s) => path in s.tables.breakpoints);
   const shape = SHAPES[port.kind];
@@ -68,7 +76,7 @@ function Port({ port, x, y, node, active, limit, near, room }: PortProps) {
   return (
     <>
       {(named || (near && !isSide(port))) && <PortName port={port} x={x} y={y} says={port.says || port.name} />}
-      {near && !isTimeout && <PortValue port={port} path={path} node={node} x={x} y={y} named={named} room={room} />}
+      {near && !isTimeout && <PortValue port={port} path={path} node={node} x={x} y={y} named={named} tagged={tagged} room={room} />}
       <i
         className={`port nodrag nopan ${shape}${isTimeout && active ? " on" : ""}${broken ? " broken" : ""}`}
         style={{ left: x, top: y }}
@@ -108,15 +116,16 @@ interface ValueProps {
   y: number;
   /** Its name stands at it already. */
   named: boolean;
+  /** How many ports its tag is for; 0 if it has none. */
+  tagged: number;
   /** How wide it may be. */
   room: number;
 }
 
 /** Beside a port, close up: its name at the sides, and its last value; before there is one, its type. */
-function PortValue({ port, path, node, x, y, named, room }: ValueProps) {
+function PortValue({ port, path, node, x, y, named, tagged, room }: ValueProps) {
   const value = useRef<HTMLElement>(null);
   const type = useStudio((s) => s.tables.nodes[node]?.ports.find((one) => one.name === port.name && one.kind === port.kind)?.type ?? "");
-  const tagged = useStudio((s) => taggedIn(s.tables.layouts[layoutKey(s)]).get(path) ?? 0);
   useEffect(() => {
     if (value.current) value.current.textContent = isSide(port) ? type : "";
     return paintValue(path, (text) => {
@@ -150,10 +159,12 @@ function placeOf(port: PortSpot, x: number, y: number, tagged: boolean): [number
   }
 }
 
+const NONE: ReadonlyMap<string, number> = new Map();
+
 let known: { layout: LayoutRecord | undefined; tagged: Map<string, number> } = { layout: undefined, tagged: new Map() };
 
 /** The ports at which a line has a tag instead of another end, and how many ports that tag is for. */
-function taggedIn(layout: LayoutRecord | undefined): Map<string, number> {
+function taggedIn(layout: LayoutRecord | undefined): ReadonlyMap<string, number> {
   if (known.layout !== layout) {
     const lines = layout?.lines.filter((line) => line.tag) ?? [];
     known = { layout, tagged: new Map(lines.flatMap((line) => line.edges.flatMap((edge) => [edge.source, edge.target].map((path): [string, number] => [path, line.edges.length])))) };

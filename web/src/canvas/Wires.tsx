@@ -60,6 +60,7 @@ export const Wires = memo(function Wires({ layout, moved, spots }: { layout: Lay
       <g className="layer-act">{active.filter((line) => !isHot(line)).map(draw)}</g>
       <g className="layer-hot">{active.filter(isHot).map(draw)}</g>
       <Pulses layout={layout} />
+      {lines.map((line) => line.says !== "" && line.says_at && <Words key={keysOf(line).join()} x={line.says_at[0]} y={line.says_at[1]} text={line.says} plain={layout.view === "activity"} />)}
     </svg>
   );
 });
@@ -115,7 +116,6 @@ const Wire = memo(function Wire({ line, strands, over, full, hot, picked, off, p
         <circle key={dot.join()} className={joint} cx={dot[0]} cy={dot[1]} r={line.is_active ? 4 : 3} />
       ))}
       {line.count_at && bundle && <Count at={line.count_at} count={line.edges.length} />}
-      {line.says !== "" && line.says_at && <Words x={line.says_at[0]} y={line.says_at[1]} text={line.says} plain={plain} />}
       <path className="wire hit" d={path} style={isSpread ? { strokeWidth: 12 + 7 * strands.length } : undefined} />
       {strands.map((one) => (
         <g key={one.key} data-edges={one.key}>

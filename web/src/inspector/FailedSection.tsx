@@ -37,8 +37,8 @@ export function FailedSection({ path }: { path: string }) {
       {(fixes.length > 0 || (error && last)) && (
         <div className="sec failed">
           <div className="remedies">
-            {fixes.map((fix) => (
-              <button type="button" className="btn primary" key={fix.text} onClick={() => void ask(fix.message as Message)}>
+            {fixes.map((fix, index) => (
+              <button type="button" className={index === 0 ? "btn primary" : "btn line"} key={fix.text} onClick={() => void ask(fix.message as Message)}>
                 {fix.text}
               </button>
             ))}

@@ -138,9 +138,10 @@ class Drawing {
     }
   }
 
-  /** Three rows for what follows each other; fewer for each of what goes on at the same time. */
+  /** Three rows for what follows each other; fewer for each of what goes on at the same time, or where there is no room. */
   private activity(lanes: Lane[]): number {
-    const rows = lanes.length < 2 ? 3 : lanes.length === 2 ? 2 : 1;
+    const room = Math.floor((this.height - TOP) / ROW / Math.max(1, lanes.length));
+    const rows = Math.max(1, Math.min(room, lanes.length < 2 ? 3 : lanes.length === 2 ? 2 : 1));
     lanes.forEach(({ spans, prefix }, lane) => {
       const top = TOP + lane * rows * ROW;
       this.text(lanes.length > 1 && prefix !== "" ? nameOf(prefix) : "activity", 12, top + 9, "ink2", 600);
