@@ -161,7 +161,9 @@ def wrong_image(value: Any, hint: Any) -> str | None:
     """Return what an array type expects and what was found instead, or None if the value matches."""
     if accepts(value, hint):
         return None
-    return f"expected {describe(hint)} ({describe_arrays(hint)}), found {describe_value(value)}"
+    is_coloured = isinstance(value, np.ndarray) and accepts(value, Color) and accepts(value[..., 0], hint)
+    remedy = '; read it with mode "gray", or put cvt_color in between' if is_coloured else ""
+    return f"expected {describe(hint)} ({describe_arrays(hint)}), found {describe_value(value)}{remedy}"
 
 
 def describe_arrays(hint: Any) -> str:

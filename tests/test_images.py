@@ -94,6 +94,12 @@ def test_what_is_of_a_type_is_not_wrong(value: Any, hint: Any) -> None:
             "expected Gray (an array of uint8, height x width), found an array of float64, 4 x 5",
         ),
         (
+            np.zeros((4, 5, 3), np.uint8),
+            Gray,
+            "expected Gray (an array of uint8, height x width), found an array of uint8, 4 x 5 x 3; "
+            'read it with mode "gray", or put cvt_color in between',
+        ),
+        (
             np.zeros((4, 5), np.uint8),
             Color,
             "expected Color (an array of uint8, height x width x 3), found an array of uint8, 4 x 5",
