@@ -30,6 +30,24 @@ def test_a_node_is_added_where_one_clicks_twice(story: Story) -> None:
     story.moves_on("store")
 
 
+def test_a_node_that_is_added_where_one_does_not_see_it_comes_into_view(story: Story) -> None:
+    canvas = story.page.locator("#canvas").bounding_box()
+    assert canvas is not None
+    story.page.mouse.dblclick(canvas["x"] + canvas["width"] - 8, canvas["y"] + canvas["height"] / 2)
+    story.page.keyboard.type("threshold")
+    expect(story.page.locator(".palette li.sel")).to_contain_text("threshold")
+    before = set(story.graph.nodes)
+    story.press("Enter")
+    story.settle()
+    (added,) = set(story.graph.nodes) - before
+
+    def is_seen() -> bool:
+        box = story.node(added).bounding_box()
+        return box is not None and box["x"] > canvas["x"] and box["x"] + box["width"] < canvas["x"] + canvas["width"]
+
+    story.until(is_seen, "the node is in view")
+
+
 def test_the_palette_shows_what_a_type_is_before_one_adds_it(story: Story) -> None:
     story.start()
     story.page.mouse.dblclick(*story.empty_place())

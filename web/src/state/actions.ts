@@ -149,7 +149,9 @@ export async function addNode(row: Pick<FoundRow, "reference" | "name" | "port" 
     const [source, target] = isSource(wire) ? [wire, port] : [port, wire];
     commands.push({ do: "Connect", source, target });
   }
-  if (await edit(commands)) select([path]);
+  if (!(await edit(commands))) return;
+  select([path]);
+  window.dispatchEvent(new CustomEvent("hfg-show", { detail: path }));
 }
 
 /** Whether edges begin at a port, seen from the level that the page shows. */
