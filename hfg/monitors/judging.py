@@ -69,7 +69,9 @@ class _Declared:
 
     def _is_here(self, spec: MonitorSpec) -> bool:
         """Return whether this process has the nodes that a monitor names; the check has refused those of several."""
-        here = {worker.path for worker in self._run._engine.core.workers if worker.node is not None}
+        if not any(group.process for group in self._whole.groups.by_name.values()):
+            return True  # what is not there after all is refused
+        here = {worker.path for worker in self._run._engine.core.workers}
         paths = [node_part(one.port if isinstance(one, Sent) else one.node) for one in spec.property.atoms()]
         return all(any(one == path or one.startswith(f"{path}/") for one in here) for path in paths if path)
 

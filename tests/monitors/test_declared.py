@@ -174,6 +174,7 @@ def test_a_running_graph_follows_edits_of_its_monitors() -> None:
     ("property_", "options", "sentence"),
     [
         ("never(active(drive))", {}, 'at "monitors.it": there is no "drive": graph "chain" has no node "drive"'),
+        ("never(sent(numbers))", {}, '"numbers" is a port of the whole graph: name the port of a node'),
         ("never(sent(ticks))", {}, '"ticks" is a node: sent() takes a port'),
         ("never(active(ticks.out))", {}, '"ticks.out" is no node'),
         ("never(fired(sink))", {"triggers": "double.number"}, "is neither a slot nor an event"),
@@ -187,6 +188,7 @@ def test_the_check_finds_monitors_that_cannot_judge(property_: str, options: Any
 
     graph = chain()
     graph.add(Take(), name="halt")
+    graph.input("numbers", int)
     graph.monitor("it", property_, **options)
     assert sentence in "\n".join(map(str, graph.check()))
     with pytest.raises(CheckFailed):

@@ -40,6 +40,8 @@ def _unfound(level: Level, spec: MonitorSpec) -> str | None:
             found = find(level, path)
             if isinstance(atom, Sent) == isinstance(found, Node):
                 return f'"{path}" is {"a node: sent() takes a port" if isinstance(found, Node) else "no node"}'
+            if isinstance(atom, Sent) and not isinstance(getattr(found, "node", None), Node):
+                return f'"{path}" is a port of the whole graph: name the port of a node that is connected to it'
         return _untriggered(level, spec.triggers) if spec.triggers else None
     except GraphError as error:
         return str(error).partition(";")[0]

@@ -225,9 +225,13 @@ class Whole:
     def begin_run(self, run: object) -> None:
         """From now on only commands change the structure. Monitors judge; a debug run also checks facts."""
         self.run = run
-        hooks.monitor(run, self)
-        if self.facts:
-            hooks.watch_facts(run)
+        try:
+            hooks.monitor(run, self)
+            if self.facts:
+                hooks.watch_facts(run)
+        except BaseException:
+            self.end_run()
+            raise
 
     def end_run(self) -> None:
         """It may be changed by hand again."""
