@@ -69,7 +69,10 @@ def test_every_real_number_has_a_unit_or_is_declared_a_plain_number(library: Cat
         if holds_reals(spec.type) and not spec.unit
     ]
     assert not missing, "\n".join(missing)
-    assert _units(library) <= {"1", "s", "1/s", "m", "px", "rad", "deg", "mm", "Hz", "m/s", "rad/s", "m/s^2"} | OF
+    assert (
+        _units(library)
+        <= {"1", "s", "1/s", "m", "px", "rad", "deg", "mm", "Hz", "m/s", "rad/s", "m/s^2", "rad/s^2"} | OF
+    )
 
 
 OF = {"of the value", "of the result", "of the points", "of the command", "of the pixel, squared"}
