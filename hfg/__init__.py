@@ -25,7 +25,7 @@ For developers: these are the layers of the package. Imports go down only. Layer
 engine; code that waits starts in layer 5.
 
     7  cli      studio    composing
-    6  nodes    files   recording   reporting   parts   catalogue    also: testing (imports all; none imports it)
+    6  nodes    files   recording   reporting   parts   catalogue   monitors   tuning   also: testing
     5  engine   links.running                             outside: hfg_transports (imports layers 0-1 only)
     4  activity   analysis   links   timeline
     3  graph

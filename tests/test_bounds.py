@@ -18,6 +18,7 @@ from hfg.nodes.activity import Wait
 from hfg.nodes.files.reading import json_of, read_bytes
 from hfg.recording import File
 from hfg.recording.chunks import Budget, content_of
+from hfg.tuning import tune
 from tests.attacks.fuzzing import KINDS
 from tests.limits import patience
 
@@ -71,12 +72,23 @@ def _activity(_folder: Path) -> None:
     hfg.analyse_activity(graph)
 
 
+def _journal(folder: Path) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph("g")
+        graph.add(Wait(), name="a")
+        return graph
+
+    (folder / "a.jsonl").write_text("{}\n{}\n")
+    tune(build, ["a.seconds=1,2"], minimize="duration_s", journal=folder / "a.jsonl")
+
+
 READERS: dict[str, Callable[[Path], object]] = {
     "HFG_MOST_ACTIVE_EDGES": _activity,
     "HFG_MOST_CHUNK_BYTES": _chunk,
     "HFG_MOST_CHUNK_MESSAGES": lambda folder: content_of(9 * MESSAGE, lambda _kind, _data: None),
     "HFG_MOST_FILE_BYTES": _bytes,
     "HFG_MOST_GRAPH_FILE_BYTES": _graph,
+    "HFG_MOST_JOURNAL_BYTES": _journal,
     "HFG_MOST_JSON_VALUES": lambda folder: json_of(b"[1,2,3,4,5,6,7,8,9]", "it"),
     "HFG_MOST_NODES_AND_PORTS": _ports,
     "HFG_MOST_PICTURE_PIXELS": lambda folder: need_fair_size(KINDS["picture"].samples()[0], "it"),

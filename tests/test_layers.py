@@ -56,6 +56,7 @@ FLOORS = {
     "hfg.monitors.compiling": 2,
     "hfg.monitors.properties": 2,
     "hfg.monitors.parsing": 2,
+    "hfg.tuning": 6,
     "hfg.cli": 7,
     "hfg.studio": 7,
     "hfg.composing": 7,  # puts what stands high where lower floors ask for it
@@ -73,6 +74,7 @@ SAME_FLOOR_PAIRS = {
     ("hfg.parts.transports", "hfg.links.local"),  # the one that is always there
     ("hfg.__main__", "hfg.cli"),
     ("hfg.testing", "hfg"),
+    ("hfg.tuning", "hfg.monitors"),  # constraints of a search
     ("hfg.nodes", "hfg.recording"),  # a family of it is made there
     ("hfg.files", "hfg.catalogue"),  # which packages a graph file may name
     ("hfg.parts", "hfg.files"),  # a graph goes to another process as the text of a file

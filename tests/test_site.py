@@ -30,7 +30,7 @@ from tools.browser import CHROMIUM, browsers
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
-MODULES = ["activity", "errors", "geometry", "images", "monitors", "panels", "recording", "registry"]
+MODULES = ["activity", "errors", "geometry", "images", "monitors", "panels", "recording", "registry", "tuning"]
 MODULES += ["testing", "timeline", "trace", "transport", "types"]
 
 

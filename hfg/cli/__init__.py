@@ -7,6 +7,7 @@
     agent       hfg agent           lets this host run parts of graphs
     runs        hfg ps, deploy, logs, restart, stop    agents and runs of a realm; deployed: the process of one
     check       hfg check TARGET    look for mistakes without running
+    tune        hfg tune TARGET     search for parameters   sweep  hfg sweep TARGET  tables of what if   search  both
     draw        hfg draw TARGET     show what a graph looks like
     convert     hfg convert TARGET  write it as a graph file
     nodes       hfg nodes [MODULE]  which node types there are
