@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "pictures" / "studio"
 ROBOT = ("examples.fetch_delivery.mission:build", "--arg", "robots=2", "--inside", "robot_0", "--run")
 FILM = FOLDER / "robot.webp"
-FRAMES, EVERY_MS, SHOWN_MS = 48, 350, 160
+FRAMES, EVERY_MS, SHOWN_MS = 40, 350, 160
 SMALL = 1080, 675
 PATIENCE_S = 120.0  # the robot works meanwhile
 
@@ -130,7 +130,7 @@ def _film(page: Page) -> None:
         frames.append(Image.open(BytesIO(page.screenshot())).convert("RGB").resize(SMALL, Image.Resampling.LANCZOS))
         page.wait_for_timeout(EVERY_MS)
     first, *others = frames
-    first.save(FILM, save_all=True, append_images=others, duration=SHOWN_MS, loop=0, quality=75, method=6)
+    first.save(FILM, save_all=True, append_images=others, duration=SHOWN_MS, loop=0, quality=75, method=2)
 
 
 PICTURES: dict[str, Callable[[Page], None]] = {
