@@ -4,9 +4,9 @@ import type { LayoutLine, LayoutRecord } from "../protocol/types";
 import { useWaits, type Full } from "../live/waits";
 import { edgeKey, nodeOf } from "../state/paths";
 import { useStudio } from "../state/studio";
-import { middleOf, pointsDown, rounded, tipOf } from "./geometry";
+import { meets, middleOf, pointsDown, rounded, tipOf } from "./geometry";
 import { type Strand, spread } from "./spreading";
-import { useZoom } from "./useView";
+import { useSight, useZoom } from "./useView";
 import type { Spot } from "./wiring";
 
 const keys = new WeakMap<LayoutLine, string[]>();
@@ -31,7 +31,9 @@ export const Wires = memo(function Wires({ layout, moved, spots }: { layout: Lay
   const near = useZoom((s) => s.level === "near");
   const selection = useStudio((s) => (near ? s.selection : NONE));
   const [over, setOver] = useState<string | null>(null);
-  const lines = layout.lines.filter((line) => !line.edges.some((e) => moved.has(nodeOf(e.source)) || moved.has(nodeOf(e.target))));
+  const sight = useSight(layout);
+  const isMoved = (line: LayoutLine) => moved.size > 0 && line.edges.some((e) => moved.has(nodeOf(e.source)) || moved.has(nodeOf(e.target)));
+  const lines = layout.lines.filter((line) => (sight === null || meets(line.points, sight)) && !isMoved(line));
   const draw = (line: LayoutLine) => {
     const keys = keysOf(line);
     const off = line.edges.some((e) => nodes[nodeOf(e.source)]?.enabled === false || nodes[nodeOf(e.target)]?.enabled === false);

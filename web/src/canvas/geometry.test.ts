@@ -1,6 +1,6 @@
 import type { LayoutRecord } from "../protocol/types";
 import { describe, expect, it } from "vitest";
-import { allInView, boundsOf, firstView, middleOf, rounded, tipOf, zoomOf } from "./geometry";
+import { allInView, boundsOf, firstView, meets, middleOf, rounded, tipOf, zoomOf } from "./geometry";
 
 describe("lines", () => {
   it("have rounded corners that are no larger than half of a side", () => {
@@ -47,4 +47,11 @@ describe("the first view of a level", () => {
 it("a mark lies on the longest part of a line", () => {
   expect(middleOf([[0, 0], [10, 0], [10, 60], [30, 60]])).toEqual([10, 30]);
   expect(middleOf([[4, 5]])).toEqual([4, 5]);
+});
+
+it("a line is in sight where the box around it is", () => {
+  const sight = { x: 0, y: 0, width: 100, height: 50 };
+  expect(meets([[-20, 20], [-5, 20]], sight)).toBe(false);
+  expect(meets([[-20, 20], [120, 20]], sight)).toBe(true);
+  expect(meets([[50, 51], [50, 90]], sight)).toBe(false);
 });

@@ -47,6 +47,12 @@ export function middleOf(points: readonly Point[]): Point {
   return best;
 }
 
+/** Whether a line may be seen in a box; the box around the line decides. */
+export function meets(points: readonly Point[], { x, y, width, height }: Box): boolean {
+  const [xs, ys] = [points.map((one) => one[0]), points.map((one) => one[1])];
+  return Math.min(...xs) <= x + width && Math.max(...xs) >= x && Math.min(...ys) <= y + height && Math.max(...ys) >= y;
+}
+
 /** The line that follows the mouse. */
 export function loose(from: Point, to: Point, upright: boolean): string {
   const bend = Math.max(24, Math.min(120, Math.hypot(to[0] - from[0], to[1] - from[1]) / 2));

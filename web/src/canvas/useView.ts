@@ -1,9 +1,9 @@
-import { useReactFlow, type Viewport } from "@xyflow/react";
-import { type RefObject, useCallback, useEffect, useRef, useState } from "react";
+import { useReactFlow, useStoreApi, type Viewport } from "@xyflow/react";
+import { type RefObject, startTransition, useCallback, useEffect, useMemo, useRef, useState } from "react";
 import { create } from "zustand";
 import type { LayoutRecord } from "../protocol/types";
 import { studio } from "../state/studio";
-import { allInView, boundsOf, firstView, type Zoom, zoomOf } from "./geometry";
+import { allInView, type Box, boundsOf, firstView, type Zoom, zoomOf } from "./geometry";
 
 /** Which of the three ways to draw the zoom asks for. */
 export const useZoom = create<{ level: Zoom }>()(() => ({ level: "middle" }));
@@ -121,6 +121,26 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
   useEffect(come, [layout, come]);
 
   return { level, partly, onMove, onMoveEnd, showAll };
+}
+
+const AFTERWARDS_MS = 60;
+
+/** The part of a level that is in sight as it comes on the screen; null soon after, when all of it is to be drawn. */
+export function useSight(layout: LayoutRecord): Box | null {
+  const flow = useStoreApi();
+  const place = key(layout);
+  const [whole, setWhole] = useState("");
+  useEffect(() => {
+    if (whole === place) return;
+    const timer = setTimeout(() => startTransition(() => setWhole(place)), AFTERWARDS_MS);
+    return () => clearTimeout(timer);
+  }, [place, whole]);
+  return useMemo(() => {
+    const { width, height } = flow.getState();
+    if (whole === place || width === 0) return null;
+    const view = kept.get(place) ?? (layout.deep ? allInView : firstView)(boundsOf(layout), width, height);
+    return { x: -view.x / view.zoom, y: -view.y / view.zoom, width: width / view.zoom, height: height / view.zoom };
+  }, [flow, layout, place, whole]);
 }
 
 const isSame = (a: Viewport, b: Viewport | null): boolean =>
