@@ -14,6 +14,9 @@ import hfg
 from hfg.base.bounds import BOUNDS, PICTURE_PIXELS, Bound
 from hfg.encoding.pictures import need_fair_size
 from hfg.encoding.plain import json_value
+from hfg.graph.editing import history_of
+from hfg.graph.editing.changes import NotesChange
+from hfg.graph.structure import naming
 from hfg.nodes.activity import Wait
 from hfg.nodes.files.reading import json_of, read_bytes
 from hfg.recording import File
@@ -72,6 +75,13 @@ def _activity(_folder: Path) -> None:
     hfg.analyse_activity(graph)
 
 
+def _groups(folder: Path) -> None:
+    """The history of edits keeps all groups for each that was declared."""
+    names = "".join(f"  group{number}: {{}}\n" for number in range(6))
+    (folder / "a.hfg.yaml").write_text(f"hfg: 1\ngroups:\n{names}nodes: {{}}\n")
+    hfg.load(folder / "a.hfg.yaml")
+
+
 def _journal(folder: Path) -> None:
     def build() -> hfg.Graph:
         graph = hfg.Graph("g")
@@ -88,6 +98,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "HFG_MOST_CHUNK_MESSAGES": lambda folder: content_of(9 * MESSAGE, lambda _kind, _data: None),
     "HFG_MOST_FILE_BYTES": _bytes,
     "HFG_MOST_GRAPH_FILE_BYTES": _graph,
+    "HFG_MOST_GROUPS": _groups,
     "HFG_MOST_JOURNAL_BYTES": _journal,
     "HFG_MOST_JSON_VALUES": lambda folder: json_of(b"[1,2,3,4,5,6,7,8,9]", "it"),
     "HFG_MOST_NODES_AND_PORTS": _ports,
@@ -195,3 +206,38 @@ def test_no_value_of_json_costs_more_than_a_hundred_bytes(part: bytes) -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=patience(100)
     )
     assert 10 < float(done.stdout) < 100
+
+
+@pytest.mark.rule("L4")
+def test_the_history_of_edits_keeps_of_each_note_what_it_changes() -> None:
+    """Commands of a stranger may make thousands of notes one by one, each of which was kept with all before it."""
+    graph = hfg.Graph("g")
+    graph.edit(*(hfg.commands.Note("", f"note {number}", number) for number in range(100)))
+    (done,) = history_of(graph).done
+    changes = [one for one in done.changes if isinstance(one, NotesChange)]
+    assert all(len(one.before) + len(one.after) == 1 for one in changes)
+    graph.edit(hfg.commands.Note("", "note 7", "another"))
+    graph.edit(hfg.commands.Note("", "note 8", None))
+    after = graph.notes()
+    assert (after["note 7"], after.get("note 8")) == ("another", None)
+    graph.undo()
+    graph.undo()
+    assert graph.notes() == {f"note {number}": number for number in range(100)}
+    graph.redo()
+    graph.redo()
+    assert graph.notes() == after
+    for _ in range(3):
+        graph.undo()
+    assert graph.notes() == {}
+
+
+@pytest.mark.rule("L4")
+def test_what_was_meant_is_not_looked_for_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of thousands of wrong names in a file was compared with thousands of others, for hours."""
+    monkeypatch.setattr(naming, "_comparing", naming._Comparing())
+    known = [f"node {number}" for number in range(1000)]
+    found = [naming.nearest("nodes 7", known) for _ in range(301)]
+    assert found == ["node 7"] * 300 + [None]
+    assert naming.nearest("nodes 7", known[:20]) == "node 7", "few names are always compared"
+    assert naming.nearest("n" * 101, ["n" * 100]) is None
+    assert "there are" in naming.suggest("nodes 7", known)

@@ -41,6 +41,7 @@ CHUNK_BYTES: Final = Bound("HFG_MOST_CHUNK_BYTES", 256 * 2**20, "bytes of one ch
 CHUNK_MESSAGES: Final = Bound("HFG_MOST_CHUNK_MESSAGES", 1_000_000, "messages of one chunk of a recording")
 FILE_BYTES: Final = Bound("HFG_MOST_FILE_BYTES", 2**30, "bytes of a file, line or array that is read whole")
 GRAPH_FILE_BYTES: Final = Bound("HFG_MOST_GRAPH_FILE_BYTES", 32 * 2**20, "bytes of a graph file or .apex file")
+GROUPS: Final = Bound("HFG_MOST_GROUPS", 1000, "groups of a graph")
 JOURNAL_BYTES: Final = Bound("HFG_MOST_JOURNAL_BYTES", 64 * 2**20, "bytes of the journal of a search for parameters")
 JSON_VALUES: Final = Bound("HFG_MOST_JSON_VALUES", 10_000_000, "values in a JSON text, including keys")
 NODES_AND_PORTS: Final = Bound(
@@ -57,6 +58,7 @@ BOUNDS: Final = (
     CHUNK_MESSAGES,
     FILE_BYTES,
     GRAPH_FILE_BYTES,
+    GROUPS,
     JOURNAL_BYTES,
     JSON_VALUES,
     NODES_AND_PORTS,

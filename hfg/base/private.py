@@ -5,6 +5,7 @@ Depends on `errors`.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import socket
@@ -101,8 +102,7 @@ def open_private(folder: Path, purpose: str = MEETING) -> int:
         raise TransportError(f"{folder}, {purpose}, cannot be used: this system does not tell whose a folder is")
     check_parents(folder, purpose)
     try:
-        for missing in [one for one in reversed((folder, *folder.parents)) if not one.is_dir()]:
-            missing.mkdir(mode=0o700, exist_ok=True)
+        make_private(folder)
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
     except OSError as error:
         raise TransportError(
@@ -116,6 +116,19 @@ def open_private(folder: Path, purpose: str = MEETING) -> int:
         os.close(handle)
         raise
     return handle
+
+
+def make_private(folder: Path) -> None:
+    """Make a folder and those on the way to it, as far as they are missing, for this user only, whatever the umask is.
+
+    Raises:
+      OSError: it cannot be made.
+    """
+    for missing in [one for one in reversed((folder, *folder.parents)) if not one.is_dir()]:
+        try:
+            missing.mkdir(mode=0o700, exist_ok=True)
+        except FileExistsError:  # a file is in its place
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(missing)) from None
 
 
 def check_private(folder: Path, found: os.stat_result, purpose: str = MEETING) -> None:

@@ -23,6 +23,7 @@ from typing import Final
 
 import msgspec
 
+from hfg.base.private import make_private
 from hfg.catalogue.offers import Offer, offers
 from hfg.catalogue.searching import Index, index_of
 
@@ -84,7 +85,7 @@ def _folder() -> Path:
 def _keep(path: Path, index: Index) -> None:
     """Write the file whole or not at all, and remove older ones; without a place for it nothing is kept."""
     with contextlib.suppress(OSError, RuntimeError):
-        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        make_private(path.parent)
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix="new-", delete=False) as file:
             file.write(msgspec.json.encode(index))
         Path(file.name).replace(path)
@@ -95,7 +96,8 @@ def _keep(path: Path, index: Index) -> None:
 
 def _fingerprint(places: Iterable[Offer]) -> str:
     digest = hashlib.blake2b(digest_size=12)
-    for part in (_FORMAT, version("hfg"), sys.version, *_distributions(), *_sources(places)):
+    offered = (f"{one.module}:{one.name}" for one in places)
+    for part in (_FORMAT, version("hfg"), sys.version, *offered, *_distributions(), *_sources(places)):
         digest.update(part.encode(errors="surrogateescape") + b"\0")
     return digest.hexdigest()
 

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
-from hfg.base.private import unsafe_place
+from hfg.base.private import make_private, unsafe_place
 from hfg.errors import TargetError
 
 if TYPE_CHECKING:
@@ -205,7 +205,7 @@ def _write(folder: Path, name: str, certificate: x509.Certificate, key: Elliptic
 
     secret = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
     try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        make_private(folder)
         need_safe(folder / name)
         for file, content, mode in (
             (folder / f"{name}.key", secret, 0o600),

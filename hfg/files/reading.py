@@ -6,7 +6,6 @@ Depends on `opening`, `parsing` and `document`.
 
 from __future__ import annotations
 
-import difflib
 import functools
 from collections.abc import Iterable
 from pathlib import Path
@@ -21,6 +20,7 @@ from hfg.files.opening import SUFFIX, bytes_of, text_in
 from hfg.files.parsing import Located, parse, plain
 from hfg.graph.editing.document import VERSION, Document, EdgeDocument, MonitorDocument, NodeDocument, OperatorDocument
 from hfg.graph.editing.from_document import Key
+from hfg.graph.structure.naming import nearest
 
 _ARROW: Final = " -> "
 _SAYS: Final = ("type", "file", "graph")
@@ -286,9 +286,9 @@ def _last(key: Key) -> str:
 
 
 def _meant(word: object, known: Iterable[Any], otherwise: str = "") -> str:
-    near = difflib.get_close_matches(str(word), [str(one) for one in known], n=1, cutoff=0.6)
-    if near:
-        return f'; did you mean "{near[0]}"?'
+    near = nearest(str(word), [str(one) for one in known])
+    if near is not None:
+        return f'; did you mean "{near}"?'
     return f"; {otherwise}" if otherwise else "; choose one of them"
 
 

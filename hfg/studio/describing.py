@@ -89,7 +89,7 @@ def changed_record(graph: Graph, before: NodeRecord) -> NodeRecord:
         before,
         parameters=_values(node),
         shown=_shown_now(node),
-        notes=level_of(graph).whole.notes.get(node, {}),
+        notes=dict(level_of(graph).whole.notes.get(node, {})),
     )
 
 
@@ -137,7 +137,7 @@ def _node(level: Level, name: str, node: Node, used: _Used) -> NodeRecord:
         ports=list(_ports(node, path, used.ports.get(node, {}))),
         missing="" if kind.is_there else kind.doc,
         activity=node in used.states,
-        notes=level.whole.notes.get(node, {}),
+        notes=dict(level.whole.notes.get(node, {})),
     )
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from hfg.base.private import check_parents, exposure_of_key, open_private, state_folder
+from hfg.catalogue.keeping import installed_index
 from hfg.errors import TransportError
 
 pytestmark = pytest.mark.rule("L5")
@@ -152,3 +153,17 @@ def test_a_key_is_its_user_s_only(
 ) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
     assert exposure_of_key("cell.key", stat_of(mode, user)) == exposure
+
+
+def test_folders_on_the_way_to_a_cache_are_for_this_user_only_whatever_the_umask_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "one" / "two"))
+    before = os.umask(0)
+    try:
+        installed_index()
+    finally:
+        os.umask(before)
+    found = [tmp_path / "one", *(tmp_path / "one").rglob("*")]
+    assert len(found) == 4
+    assert not [one for one in found if one.stat().st_mode & 0o077]

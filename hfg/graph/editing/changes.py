@@ -311,7 +311,12 @@ class PortChange(Change):
 
 @dataclass(eq=False)
 class NotesChange(Change):
-    """Editors have noted something else about a node, or about the whole graph."""
+    """Editors have noted something else about a node, or about the whole graph.
+
+    Attributes:
+      before: the notes that change, as they were. The others are not kept: commands may make thousands, one by one.
+      after: the notes that change, as they are then.
+    """
 
     notes: dict[Node | None, dict[str, Any]]
     node: Node | None
@@ -320,7 +325,10 @@ class NotesChange(Change):
 
     @override
     def do(self) -> None:
-        if self.after:
-            self.notes[self.node] = self.after
-        else:
-            self.notes.pop(self.node, None)
+        there = self.notes.setdefault(self.node, {})
+        for name in self.before:
+            if name not in self.after:
+                del there[name]
+        there.update(self.after)
+        if not there:
+            del self.notes[self.node]

@@ -150,8 +150,7 @@ class _Interpreter:
                 f'note "{command.name}" of "{command.path}": notes are plain data, got {command.value!r:.80} '
                 f"({error}); give numbers, texts, lists and dicts"
             ) from error
-        notes = {name: value for name, value in self.root.whole.notes.get(node, {}).items() if name != command.name}
-        self.steps.set_notes(node, notes if value is None else notes | {command.name: value})
+        self.steps.set_note(node, command.name, value)
 
     # --- groups and ports of the whole graph ---
 

@@ -47,7 +47,7 @@ def replace(steps: Steps, old: Node, new: Node) -> list[tuple[Level, Edge]]:
                 steps.do(GateChange(level, gate, position, added=False))
                 steps.do(GateChange(level, _gate_of(gate, old, new), position, added=True))
         steps.set_promotions(around, _promoted_by(around, around.promotions.by_name, old, new))
-        notes = steps.root.whole.notes.get(old, {})
+        notes = dict(steps.root.whole.notes.get(old, {}))
         steps.set_notes(old, {})
         steps.set_notes(new, notes)
     return [(around, other) for other in others]
@@ -60,7 +60,7 @@ def _replace_box(steps: Steps, around: Level, old: Node, new: Node, edges: list[
     spots = [around.connections.position(edge) for edge in edges_of(around, old)]
     gates = [(level, gate) for level in steps.gated_levels() for gate in level.gates if old in (gate.target, gate.by)]
     promoted = around.promotions.copied()
-    notes = steps.root.whole.notes.get(old, {})
+    notes = dict(steps.root.whole.notes.get(old, {}))
     steps.remove(old)
     add(around, new, name, options.said())
     added = NodeChange.of(new, added=True)

@@ -179,10 +179,19 @@ class Steps:
 
     def set_notes(self, node: Node | None, after: dict[str, Any]) -> None:
         """Replace the notes about a node, or about the whole graph."""
-        notes = self.root.whole.notes
-        before = notes.get(node, {})
+        there = self.root.whole.notes.get(node, {})
+        before = {name: value for name, value in there.items() if name not in after or after[name] != value}
+        changed = {name: value for name, value in after.items() if name not in there or there[name] != value}
+        if before or changed:
+            self.do(NotesChange(self.root.whole.notes, node, before, changed))
+
+    def set_note(self, node: Node | None, name: str, value: object) -> None:
+        """Replace one note about a node, or about the whole graph; None removes it."""
+        there = self.root.whole.notes.get(node, {})
+        before = {name: there[name]} if name in there else {}
+        after = {} if value is None else {name: value}
         if before != after:
-            self.do(NotesChange(notes, node, before, after))
+            self.do(NotesChange(self.root.whole.notes, node, before, after))
 
     # --- edges, gates, promotions ---
 

@@ -56,6 +56,10 @@ class Boundary:
         """Return all ports; inputs and outputs share their names."""
         return {"start": self.start, "stop": self.stop, "abort": self.abort, **self.inputs, **self.outputs}
 
+    def is_taken(self, name: str) -> bool:
+        """Return whether a port has this name."""
+        return name in self.inputs or name in self.outputs or name in ("start", "stop", "abort")
+
     def has(self, port: object) -> bool:
         """Return whether it is one of the three that are the whole graph's, wherever they are named (rule A10)."""
         return port is self.start or port is self.stop or port is self.abort

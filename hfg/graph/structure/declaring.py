@@ -36,7 +36,7 @@ def need_new_port(level: Level, kind: Literal["input", "output"], name: str, hin
             f"declare `{name} = hfg.{kind.title()}(...)` in its class"
         )
     need_name(f"an {kind} of the graph", name)
-    if name in level.ports.by_name():
+    if level.ports.is_taken(name):
         raise GraphError(f'{level.title} has a port "{name}" already; choose another name')
     if not is_hint(hint):
         raise GraphError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
+from hfg.base.bounds import GROUPS
 from hfg.errors import GraphError
 from hfg.graph.structure.options import GroupSpec
 
@@ -35,11 +36,16 @@ class Groups:
                 f'group "{spec.name}" is declared already, as {self.by_name[spec.name]}; '
                 "declare it once, or choose another name"
             )
-        self._declared.add(spec.name)
-        self.by_name[spec.name] = spec
+        self.change(spec)
 
     def change(self, spec: GroupSpec) -> None:
-        """Let a group be declared otherwise, in its place in the order."""
+        """Let a group be declared otherwise, in its place in the order; a new one comes last.
+
+        Raises:
+          GraphError: there are too many.
+        """
+        if spec.name not in self.by_name and len(self.by_name) > GROUPS.most:
+            raise GraphError(f'group "{spec.name}" is one too many: {GROUPS.remedy}')
         self._declared.add(spec.name)
         self.by_name[spec.name] = spec
 

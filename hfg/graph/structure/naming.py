@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from time import monotonic
+from typing import Final
 
 from hfg.base.controls import name_problem
 from hfg.errors import GraphError
 from hfg.nodetypes.node import Node
+
+_LONGEST: Final = 100  # letters of a name for which others are looked at
+_FEW: Final = 100  # names, which cost some milliseconds
+_MOST_COMPARED: Final = 300_000  # names in a minute, where there are more; some ten seconds
 
 
 def need_name(what: str, name: object) -> str:
@@ -30,12 +36,46 @@ def need_name(what: str, name: object) -> str:
     return name
 
 
+def nearest(name: str, names: Sequence[str]) -> str | None:
+    """Return the name that was probably meant; None if none is near, or looking for it would take too long.
+
+    A file may have thousands of wrong names, and for each of them thousands to compare it with.
+    """
+    if len(name) > _LONGEST:
+        return None
+    if len(names) > _FEW and not _comparing.may(len(names)):
+        return None
+    near = difflib.get_close_matches(name, [one for one in names if len(one) <= _LONGEST], n=1, cutoff=0.6)
+    return near[0] if near else None
+
+
+class _Comparing:
+    """How many names this process has compared in the present minute."""
+
+    def __init__(self) -> None:
+        self._began = 0.0
+        self._compared = 0
+
+    def may(self, count: int) -> bool:
+        """Return whether `count` more can be compared, and count them."""
+        now = monotonic()
+        if now - self._began > 60:
+            self._began, self._compared = now, 0
+        if self._compared + count > _MOST_COMPARED:
+            return False
+        self._compared += count
+        return True
+
+
+_comparing = _Comparing()
+
+
 def suggest(name: str, known: Iterable[str]) -> str:
     """End a message about an unknown name: what was probably meant, else what there is."""
     names = list(known)
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    if near:
-        return f'did you mean "{near[0]}"?'
+    near = nearest(name, names)
+    if near is not None:
+        return f'did you mean "{near}"?'
     if not names:
         return "there are none"
     shown = ", ".join(f'"{one}"' for one in names[:8])
