@@ -19,15 +19,15 @@ _STEP = 0.05  # metres of way between two places that are looked at
 
 
 class LimitTwist(Node):
-    """Limit speed and acceleration of a velocity command (slew rate).
+    """Limit speed and acceleration of a velocity command (slew).
 
     Fires once per command. All parts of a velocity are shortened alike, so the robot keeps its direction and its arc.
 
     Attributes:
       speed: greatest speed ahead and aside together.
-      turn: greatest rate of turning.
+      turn: greatest angular velocity.
       acceleration: greatest change of the speed, in each second.
-      turn_acceleration: greatest change of the rate of turning, in each second.
+      turn_acceleration: greatest change of the angular velocity, in each second.
       twist: as commanded.
       limited: as the robot can do; the first one begins at rest.
 
