@@ -311,15 +311,19 @@ class State:
 
     def reaches(self, line: Line) -> bool:
         """The same without its source: what that sent before it was disabled is still delivered (F10)."""
-        source, target = line.edge.source.owner, line.edge.target
-        around = self.stations[source].leaf.boxes if source >= 0 else ()
-        if is_box(source):
-            around = (*self.structure.boxes[-2 - source].boxes, -2 - source)
+        target = line.edge.target
+        around = (*self._boxes_around(line.edge.source.owner), *self._boxes_around(target.owner))
         if any(not self._box_open(box) for box in line.edge.via if box not in around):
-            return target.kind == "slot" and target.name == "enable"
+            return False  # the edge only passes through it, and the ports there are disabled
         if self.is_outside(target.owner) or (target.kind == "slot" and target.name == "enable"):
             return True
         return self.is_enabled(target.owner)
+
+    def _boxes_around(self, owner: int) -> tuple[int, ...]:
+        """Return the subgraphs that a node or subgraph is in, itself included."""
+        if is_box(owner):
+            return (*self.structure.boxes[-2 - owner].boxes, -2 - owner)
+        return self.stations[owner].leaf.boxes if owner >= 0 else ()
 
     def is_outside(self, owner: int) -> bool:
         """Return whether a port belongs to the world outside, of the graph or of an iterating subgraph."""
