@@ -30,7 +30,7 @@ def tab(command: Command, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
 
 
 def test_verbs_and_options(tab: Tab) -> None:
-    assert tab("hfg t") == ["tap", "top", "trigger"]
+    assert tab("hfg t") == ["tap", "top", "tune", "trigger"]
     assert "--trace" in tab("hfg run steps.py --t")
 
 
