@@ -217,6 +217,7 @@ class _Applying(Placing):
     def _set_gates_anew(self) -> None:
         core = self.core
         gated = {worker: None for gate in core.gates for worker in gate.workers}
+        gated |= {worker: None for worker in self.elsewhere if worker.gates_over}  # moved out of what was gated
         states = {gate.state: None for gate in core.gates}
         for worker in gated:
             worker.be_gated(None)
