@@ -45,10 +45,8 @@ class _Watch:
         """Find the facts, and where their nodes are now."""
         begun = {check.fact for check in self.checks if check.has_begun}
         here = {worker.path for worker in self.core.workers}
-        checks = [_Check(fact, self.core) for fact in self.run.graph.facts]
+        checks = [_Check(fact, self.core, has_begun=fact in begun) for fact in self.run.graph.facts]
         self.checks = [check for check in checks if check.paths <= here]
-        for check in self.checks:
-            check.has_begun = check.fact in begun
 
     def see(self, event: TraceEvent) -> None:
         """Follow the trace."""
@@ -73,10 +71,10 @@ class _Check:
       has_begun: activity has come to one of them.
     """
 
-    def __init__(self, fact: Fact, core: Any) -> None:
+    def __init__(self, fact: Fact, core: Any, *, has_begun: bool) -> None:
         self.fact = fact
         self.paths = {path for node in fact.nodes for path in _paths_in(node)}
-        self.has_begun = False
+        self.has_begun = has_begun
         self._workers = [worker for worker in core.workers if worker.path in self.paths and worker.scope is None]
         self._into = {edge.label: edge for edge in core.edges if _target(edge.label) in self.paths}
         self._stretch: deque[str] = deque(maxlen=_STRETCH)

@@ -6,6 +6,7 @@ Depends on `searching` and `tuning`.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -133,25 +134,13 @@ def sweep(
     """
     graph = built(build)
     tuned = [read_parameter(graph, one) for one in parameters]
-    open_one = next((one for one in tuned if any(not cell.levels for cell in one.cells)), None)
-    if open_one is not None:
-        raise UsageError(
-            f'parameter "{open_one.path}" has any number of values: list some, as in {open_one.path}=1,2, or '
-            f"{open_one.path}=1..2/5 for five"
-        )
     happenings = [None, *(read_happening(graph, one) for one in faults)]
-    units = [[(index + 0.5) / cell.levels for index in range(cell.levels)] for one in tuned for cell in one.cells]
-    count = len(happenings)
-    for each in units:
-        count *= len(each)
-    if count > _MOST_ROWS:
-        raise UsageError(f"there are {count:,} combinations; a sweep has {_MOST_ROWS:,} at most")
+    combinations = _combinations(tuned, _MOST_ROWS // len(happenings))
     every, rows = read_seeds(seeds), list[Row]()
     paths = seed_parameters(graph, seed_parameter) if seeds else []
     judged = read_scores(scores, ())
     problem = Problem(build, Space(tuned), judged, paths, until_s, constraints or {})
     effort = Effort()
-    combinations = [list(one) for one in itertools.product(*units)]
     for happening in happenings:
         one = problem if happening is None else replace(problem, happenings=[happening])
         notebook = Journal(None, header_of(one, [], "sweep", 0, None, every, graph.name))
@@ -162,3 +151,22 @@ def sweep(
             found = searching.evaluate(candidates)
         rows += [Row("" if happening is None else happening.name, each.over_good(len(judged))) for each in found]
     return Sweep(judged, tuned, rows, effort)
+
+
+def _combinations(tuned: Sequence[Tuned], most: int) -> list[list[float]]:
+    """Return every combination of the listed values, each as its place in the unit cube.
+
+    Raises:
+      UsageError: a parameter has any number of values, or there are too many combinations.
+    """
+    for one in tuned:
+        if not all(cell.levels for cell in one.cells):
+            raise UsageError(
+                f'parameter "{one.path}" has any number of values: list some, as in {one.path}=1,2, or '
+                f"{one.path}=1..2/5 for five"
+            )
+    units = [[(index + 0.5) / cell.levels for index in range(cell.levels)] for one in tuned for cell in one.cells]
+    count = math.prod(map(len, units))
+    if count > most:
+        raise UsageError(f"there are {count:,} combinations for each fault and for none; a sweep has {most:,} at most")
+    return [list(one) for one in itertools.product(*units)]

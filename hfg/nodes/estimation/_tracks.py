@@ -59,6 +59,15 @@ class _Target:
         push = np.array([[dt * dt / 2, 0], [0, dt * dt / 2], [dt, 0], [0, dt]]) * acceleration
         self.state, self.covariance = predict(self.state, self.covariance, step, push @ push.T)
 
+    def is_seen(self, point: Any, noise: float, stamp: float) -> None:
+        """Take in where it is seen."""
+        self.state, self.covariance = correct(self.state, self.covariance, point, _PLACE, noise**2 * np.eye(2))
+        self.seen, self.missed, self.last = self.seen + 1, 0, stamp
+
+    def is_missed(self) -> None:
+        """It is not seen this time."""
+        self.missed += 1
+
     def distances(self, points: Any, noise: float) -> Any:
         """Return the squared Mahalanobis distance of each point."""
         spread = self.covariance[:2, :2] + noise**2 * np.eye(2)
@@ -116,13 +125,10 @@ class PointTracks:
         for target in self._targets:
             at = pairs.get(target.number)
             if at is None:
-                target.missed += 1
-                continue
-            free[at] = False
-            target.state, target.covariance = correct(
-                target.state, target.covariance, points[at], _PLACE, noise**2 * np.eye(2)
-            )
-            target.seen, target.missed, target.last = target.seen + 1, 0, stamp
+                target.is_missed()
+            else:
+                free[at] = False
+                target.is_seen(points[at], noise, stamp)
         # a target that was not sent yet must not be missed
         kept = [
             one for one in self._targets if stamp - one.last <= forget_s and (one.seen >= confirm or not one.missed)
