@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import contextvars
 import ctypes
+import gc
 import os
 import select
 import signal
@@ -142,6 +143,7 @@ def _answer(link: Any) -> bytes | Died:
 
 def _serve(work: Callable[[bytes], bytes], link: Any, patience_s: float | None) -> None:
     """Fork a process for each task, until there are no more."""
+    gc.freeze()  # garbage of the program may have finalizers that wait for its threads, which a fork does not have
     with contextlib.suppress(OSError):
         os.setpgid(0, 0)  # Ctrl-C is for the program that asks, which ends this group
     _die_with_parent()

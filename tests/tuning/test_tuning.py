@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,8 @@ from hfg.tuning import Tuning, mean_of, read_parameter, sweep, tune
 from hfg.tuning.losses import Loss, best_first, front
 from hfg.tuning.methods import METHODS, make_method
 from hfg.tuning.space import Cell
+from hfg.tuning.workers import Died, Workers
+from tests.limits import patience
 
 pytestmark = pytest.mark.slow
 
@@ -74,6 +78,28 @@ def test_a_search_that_was_cut_off_goes_on_to_the_same_result_and_journal(tmp_pa
         part.write_bytes(text[: len(text) * share // 10])  # as a process leaves it that is killed, mostly within a line
         assert told(search(journal=part)) == told(first)
         assert part.read_bytes() == text
+
+
+def test_a_process_leaves_the_garbage_of_its_parent_alone() -> None:
+    """As a Zenoh session that nobody closed: its finalizer waits for threads that a forked process does not have."""
+    here = os.getpid()
+
+    class Session:
+        def __init__(self) -> None:
+            self.me = self
+
+        def __del__(self) -> None:
+            if os.getpid() != here:
+                threading.Event().wait()
+
+    gc.disable()
+    try:
+        Session()
+        with Workers(lambda _: str(gc.collect()).encode(), processes=1, patience_s=patience(5)) as workers:
+            (found,) = workers.in_order([b""])
+    finally:
+        gc.enable()
+    assert not isinstance(found, Died)
 
 
 def test_crashes_and_errors_are_counted_and_kept_with_their_seed() -> None:
