@@ -23,6 +23,7 @@ from benchmarks.measure import Record, here, machine, measure, write
 
 SUITES = (
     "bench_alive",
+    "bench_budgets",
     "bench_edits",
     "bench_files",
     "bench_kinds",

@@ -75,6 +75,7 @@ SAME_FLOOR_PAIRS = {
     ("hfg.__main__", "hfg.cli"),
     ("hfg.testing", "hfg"),
     ("hfg.tuning", "hfg.monitors"),  # constraints of a search
+    ("hfg.reporting", "hfg.monitors"),  # their violations are part of a page
     ("hfg.nodes", "hfg.recording"),  # a family of it is made there
     ("hfg.files", "hfg.catalogue"),  # which packages a graph file may name
     ("hfg.parts", "hfg.files"),  # a graph goes to another process as the text of a file

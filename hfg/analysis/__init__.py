@@ -7,17 +7,21 @@ searching  its states, and which places go together      proving    proofs and c
 reach      what activity reaches, region by region       findings   what is probably a mistake
 diagram    the states, and what leads where              wording    a report in words
 report     the analysis of activity, for users
-response   response times on one processor         timing       deadlines of a graph
+response   response times on one processor         waves        what a source causes
+timing     deadlines of a graph                    profile      durations that a run has measured
 """
 
 from hfg.analysis.diagram import StateDiagram
+from hfg.analysis.profile import Measured, Profile
 from hfg.analysis.proving import Region, Step, Verdict
 from hfg.analysis.report import ActivityReport, analyse_activity
 from hfg.analysis.timing import PathTime, TimeReport, analyse_time
 
 __all__ = [
     "ActivityReport",
+    "Measured",
     "PathTime",
+    "Profile",
     "Region",
     "StateDiagram",
     "Step",

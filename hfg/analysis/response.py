@@ -35,6 +35,7 @@ class Task:
       lowest: the lowest priority of its nodes; larger numbers come first.
       highest: the highest one.
       deadline_s: of all its nodes from the begin of the wave; infinity if they have none, or different ones.
+      in_order: first in, first out takes it as a whole; otherwise parts of it may come after other waves.
     """
 
     period_s: float
@@ -43,6 +44,7 @@ class Task:
     lowest: int = 0
     highest: int = 0
     deadline_s: float = math.inf
+    in_order: bool = True
 
     @property
     def work_s(self) -> float:
@@ -65,7 +67,8 @@ def response_times(tasks: Sequence[Task], policy: str) -> list[float]:
     if utilisation(tasks) > 1 + _ROUNDING and policy != "priority":
         return [math.inf] * len(tasks)
     if policy == "fifo":
-        return [_fifo(tasks) + task.jitter_s for task in tasks]
+        whole = _fifo(tasks)
+        return [(whole if task.in_order else _busy(tasks)) + task.jitter_s for task in tasks]
     if policy == "priority":
         return [_priority(tasks, number) for number in range(len(tasks))]
     busy = _busy(tasks)
@@ -142,7 +145,8 @@ def _priority(tasks: Sequence[Task], number: int) -> float:
             lambda t, own=own: own + sum(_released(task, t) * task.work_s for task in first),  # type: ignore[misc]
         )
         worst = max(worst, begun + last - job * me.period_s + me.jitter_s)
-    return worst
+    # beyond a period the next wave has come, whose firings may go ahead of the last ones of this wave
+    return worst if worst <= me.period_s else max(worst, busy + me.jitter_s)
 
 
 def _meets_deadlines(tasks: Sequence[Task], busy: float) -> bool:

@@ -9,12 +9,13 @@ from typing import Annotated
 
 import typer
 
+from hfg.analysis.profile import Profile
 from hfg.analysis.report import MAX_STATES, ActivityReport, analyse_activity
 from hfg.analysis.timing import TimeReport, analyse_time
 from hfg.cli import show
 from hfg.cli.options import LoadFlags, TargetArgument
 from hfg.cli.target import load_graph
-from hfg.errors import CheckFailed, FileError, HfgError, MachineError, Problem, TargetError
+from hfg.errors import CheckFailed, FileError, HfgError, MachineError, Problem, TargetError, UsageError
 from hfg.graph import Graph
 from hfg.graph.structure.refusals import keep_refusals, problem_of
 from hfg.parts.model.costs import costs_of_deaths
@@ -35,17 +36,26 @@ def check(
     time: Annotated[
         bool, typer.Option("--time", help="Also bound how long ways from sources with a rate take; see takes_s.")
     ] = False,
+    profile: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="With --time: durations that hfg run --profile has measured."),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the problems as JSON.")] = False,
 ) -> int:
     """Check a graph for errors without running it (exit code 1 if there are any)."""
     show.set_debug(flags.debug)
     if states is not None and not activity:
         raise TargetError(f"--states {states} bounds what --activity looks at, and --activity is not given; add it")
+    if profile is not None and not time:
+        raise TargetError(f"--profile {profile} has durations for --time, and --time is not given; add it")
+    measured = None if profile is None else _loaded(profile)
     found = _Findings(target)
     with keep_refusals() as found.problems:
         graph = found.load(flags)
     if graph is not None:
-        found.look_at(graph, MAX_STATES if states is None else states, activity=activity, time=time)
+        found.look_at(graph, MAX_STATES if states is None else states, activity=activity)
+        if time:
+            found.bound(graph, measured)
     if json:
         show.json(found.as_data(activity=activity))
     else:
@@ -86,7 +96,7 @@ class _Findings:
             self.refused_file = error
         return None
 
-    def look_at(self, graph: Graph, states: int, *, activity: bool, time: bool) -> None:
+    def look_at(self, graph: Graph, states: int, *, activity: bool) -> None:
         """Check a graph that could be built."""
         self._name = f'graph "{graph.name}"'
         refused = {problem.path.rpartition(" -> ")[2] for problem in self.problems}
@@ -96,11 +106,22 @@ class _Findings:
         if activity and not self.count("error"):
             self._activity = analyse_activity(graph, max_states=states)
             self.problems += self._activity.problems
-        if time and not self.count("error"):
-            self._time = analyse_time(graph)
-            self.problems += self._time.problems
         if not self.count("error"):
             self._costs = list(costs_of_deaths(graph))
+
+    def bound(self, graph: Graph, measured: Profile | None) -> None:
+        """Bound how long ways take, by declared durations or by those of a profile.
+
+        Raises:
+            TargetError: the profile is of another graph.
+        """
+        if self.count("error"):
+            return
+        try:
+            self._time = analyse_time(graph, None if measured is None else measured.durations(graph))
+        except UsageError as error:
+            raise TargetError(str(error)) from None
+        self.problems += self._time.problems
 
     def count(self, severity: str) -> int:
         """Return how many problems are as severe as that."""
@@ -127,6 +148,13 @@ class _Findings:
         counts = [_count(self.count(severity), severity) for severity in ("error", "warning")]
         hints = self.count("hint")
         yield f"{self._name}: {', '.join(counts + ([_count(hints, 'hint')] if hints else []))}"
+
+
+def _loaded(profile: Path) -> Profile:
+    try:
+        return Profile.load(profile)
+    except UsageError as error:
+        raise TargetError(str(error)) from None
 
 
 def _unbuilt(target: str, error: TargetError, cause: Exception) -> Sequence[Problem]:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Final, TextIO
 
 import typer
 
-from hfg.base.whole import GrowingFile
+from hfg.base.whole import GrowingFile, need_writable
 from hfg.cli import show
 from hfg.cli.execute import GraphRun
 from hfg.cli.options import MonitorOption, RunFlags, SettingsOption, TableOption, TargetArgument, VerboseOption
@@ -50,6 +50,10 @@ def run(
             help="Write a report page, one HTML file: drawing, activity, counts, images.",
         ),
     ] = None,
+    profile: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write how long the firings of each node took, for hfg check --time."),
+    ] = None,
     pictures: Annotated[int, typer.Option(metavar="N", help="With --report: show at most N images.")] = 24,
     table: TableOption = True,
     json: Annotated[
@@ -64,6 +68,8 @@ def run(
     """Run a graph. Ctrl-C stops it; a second Ctrl-C stops it immediately."""
     running = GraphRun.load(target, flags, verbose=verbose)
     _declare(running.graph, monitor or ())
+    if profile is not None:
+        _need_writable(profile)
     output = _Output(sys.stdout)
     unwritten: list[str] = []
     pages: list[RunPage] = []
@@ -80,6 +86,8 @@ def run(
             if report_file is not None:
                 pages.append(run.report_page(report_file, pictures=pictures))
                 running.interrupt.before_leaving.append(pages[0].write)
+            if profile is not None:
+                run.statistics()  # starts the measuring of times
             live.begin(run)
 
         running.run(begin, trace=write, settings=settings, **options.said())
@@ -87,6 +95,8 @@ def run(
         if page.error is not None:
             show.sentence(f'the report "{page.path}" cannot be written: {page.error.strerror}')
             unwritten.append(str(page.path))
+    if profile is not None and runs and not _save(runs[0], profile):
+        unwritten.append(str(profile))
     if output.broken is not None:
         raise output.broken
     if json and running.report is not None:
@@ -95,6 +105,26 @@ def run(
         show.explanations(explained.explain())
     violated = monitor and any(declared(one).violations for one in runs)
     return running.ended(verbose=verbose, reports=not json or verbose > 0) or int(bool(unwritten or violated))
+
+
+def _need_writable(profile: Path) -> None:
+    try:
+        need_writable(profile)
+    except (OSError, ValueError) as error:
+        said = error.strerror if isinstance(error, OSError) else error
+        raise TargetError(f"the profile cannot be written to {profile}: {said}") from None
+
+
+def _save(run: Run, profile: Path) -> bool:
+    """Write the profile of a run; says if that is not possible any more."""
+    from hfg.analysis.profile import Profile  # imports all analyses
+
+    try:
+        Profile.of(run.graph, run.statistics()).save(profile)
+    except OSError as error:
+        show.sentence(f'the profile "{profile}" cannot be written: {error.strerror}')
+        return False
+    return True
 
 
 def _declare(graph: Graph, properties: Iterable[str]) -> None:

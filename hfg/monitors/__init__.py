@@ -4,6 +4,7 @@ formulas     what is true at a point: activity, values, firings, and what was tr
 compiling    a formula as one function
 properties   patterns over formulas, and what judges them
 parsing      reads them from text
+violations   what has shown that a property does not hold
 watching     lets them be judged in a run; needs the engine, so it is imported when it is used
 judging      judges each run of a graph by the monitors that the graph declares
 facts        the facts that are stated in the graph, in debug runs
@@ -35,10 +36,11 @@ from hfg.monitors.properties import Property, Verdict, always, eventually, leads
 
 if TYPE_CHECKING:
     from hfg.monitors.judging import declared
-    from hfg.monitors.watching import Monitors, Seen, Violation, watch
+    from hfg.monitors.violations import Seen, Violation
+    from hfg.monitors.watching import Monitors, watch
 else:
     __getattr__ = on_demand(
-        __name__, {"judging": ("declared",), "watching": ("Monitors", "Seen", "Violation", "watch")}
+        __name__, {"judging": ("declared",), "violations": ("Seen", "Violation"), "watching": ("Monitors", "watch")}
     )
 
 __all__ = [

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from functools import partial
 from typing import Any
-from weakref import WeakKeyDictionary
 
 from hfg.base.logs import Log
 from hfg.engine import Run
@@ -14,11 +13,11 @@ from hfg.graph.structure.level import Whole
 from hfg.graph.structure.monitors import node_part
 from hfg.graph.structure.options import MonitorSpec
 from hfg.monitors.formulas import Sent
-from hfg.monitors.watching import Monitors, Violation
+from hfg.monitors.violations import Violation
+from hfg.monitors.watching import Monitors, monitors_of
 from hfg.types import accepts
 
 _LOGGER = Log("hfg.monitors")
-_judging: WeakKeyDictionary[Run, _Declared] = WeakKeyDictionary()
 
 
 def declared(run: Run) -> Monitors:
@@ -27,18 +26,18 @@ def declared(run: Run) -> Monitors:
     Raises:
       UsageError: its graph declares none.
     """
-    judging = _judging.get(run)
-    if judging is None:
+    found = next((one for one in monitors_of(run) if one.are_declared), None)
+    if found is None:
         raise UsageError(
             f'graph "{run.graph.name}" declares no monitor: write graph.monitor("dark", monitors.never(...)), or call '
             "monitors.watch(run, dark=...)"
         )
-    return judging.monitors
+    return found
 
 
 def judge(run: Run, whole: Whole) -> None:
     """Begin to judge a run, and follow edits; see `Whole.begin_run`."""
-    judging = _judging[run] = _Declared(run, whole)
+    judging = _Declared(run, whole)
     whole.on_monitors = judging.follow
     judging.follow()
 
@@ -47,7 +46,7 @@ class _Declared:
     """The monitors of a graph in one run."""
 
     def __init__(self, run: Run, whole: Whole) -> None:
-        self.monitors = Monitors(run)
+        self.monitors = Monitors(run, are_declared=True)
         self.monitors._listen()
         self._run = run
         self._whole = whole

@@ -1,7 +1,7 @@
 """Lets properties be judged while a run is in progress.
 
 Each port that a formula names gets a tap, and only changes of activity are traced. So fused regions stay fused, and a
-node that no formula names pays nothing. Depends on `properties` and the engine.
+node that no formula names pays nothing. Depends on `properties`, `violations` and the engine.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from time import monotonic
 from typing import Any, Final, Literal
 
@@ -20,6 +19,7 @@ from hfg.errors import GraphError, MonitorViolated, UsageError
 from hfg.graph.structure.naming import suggest
 from hfg.monitors.formulas import Active, Fired, Sent
 from hfg.monitors.properties import Judge, Property, Verdict
+from hfg.monitors.violations import Seen, Violation
 from hfg.trace import ActivityChanged, RunEnded, StructureChanged, TraceEvent
 
 _LOGGER = Log("hfg.monitors")
@@ -31,46 +31,6 @@ _KEPT: Final = frozenset({bool, int, float, str, type(None)})  # of others, whic
 OnViolation = Literal["note", "fail"] | Callable[["Violation"], object]
 
 
-@dataclass(frozen=True, slots=True)
-class Seen:
-    """A point that a monitor has judged.
-
-    Attributes:
-      after_s: seconds since the monitor began.
-      what: the port or node.
-      value: what passed the port, or whether the node is active; of a value that is not plain, its type.
-    """
-
-    after_s: float
-    what: str
-    value: object
-
-    def __str__(self) -> str:
-        shown = self.value.__name__ if isinstance(self.value, type) else repr(self.value)
-        return f"{self.after_s:.6g} s  {self.what}  {shown:.80}"
-
-
-@dataclass(frozen=True, slots=True)
-class Violation:
-    """A property did not hold.
-
-    Attributes:
-      monitor: the name of the monitor.
-      what: the property.
-      after_s: seconds since the monitor began.
-      stretch: the last points that it has judged, the newest last.
-    """
-
-    monitor: str
-    what: str
-    after_s: float
-    stretch: tuple[Seen, ...]
-
-    def __str__(self) -> str:
-        seen = "".join(f"\n  {one}" for one in self.stretch)
-        return f'monitor "{self.monitor}" is violated after {self.after_s:.6g} s: {self.what}{seen}'
-
-
 class Monitors:
     """The monitors of one run.
 
@@ -78,17 +38,20 @@ class Monitors:
       violations: each time at which a property has ceased to hold, in order; of each monitor the first 100.
       counts: how often each was violated, by the name of its monitor.
       broken: by monitor, the error of a condition that raised; such a monitor judges nothing more.
+      began: when they began, on the run's clock.
       now: returns the time on the run's clock.
+      are_declared: the graph declares them.
     """
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Run, *, are_declared: bool = False) -> None:
+        self.are_declared = are_declared
         self.violations: list[Violation] = []
         self.counts: dict[str, int] = {}
         self.broken: dict[str, Exception] = {}
         self._run = run
         self._engine = run._engine
         self.now = self._engine.now if self._engine.time.epoch is None else _clock(self._engine.time.epoch)
-        self._began = self.now()
+        self.began = self.now()
         self._watches: dict[str, _Watch] = {}
         self._errors: dict[str, MonitorViolated] = {}
         self._timer: Any = None
@@ -99,6 +62,11 @@ class Monitors:
     def verdicts(self) -> dict[str, Verdict]:
         """What is known of each property, by the name of its monitor."""
         return {name: one.judge.verdict for name, one in self._watches.items()}
+
+    @property
+    def properties(self) -> dict[str, Property]:
+        """What is judged, by the name of its monitor."""
+        return {name: one.what for name, one in self._watches.items()}
 
     def check(self) -> None:
         """See that no property was violated; open ones are not.
@@ -117,6 +85,7 @@ class Monitors:
     # --- where they listen ------------------------------------------------------------------------------------------
 
     def _listen(self) -> None:
+        vars(self._run).setdefault("_monitors", []).append(self)  # there they last as long as it does
         self._run.trace(self._changed, changes_only=True)
 
     def _add(self, properties: Mapping[str, Property], on_violation: OnViolation) -> None:
@@ -197,8 +166,8 @@ class Monitors:
     # --- what is found ------------------------------------------------------------------------------------------------
 
     def _violated(self, one: _Watch, t: float) -> None:
-        stretch = tuple(Seen(at - self._began, what, value) for at, what, value in one.ring)
-        violation = Violation(one.name, str(one.what), t - self._began, stretch)
+        stretch = tuple(Seen(at - self.began, what, value) for at, what, value in one.ring)
+        violation = Violation(one.name, str(one.what), t - self.began, stretch)
         count = self.counts[one.name] = self.counts.get(one.name, 0) + 1
         if count <= _MOST:
             self.violations.append(violation)
@@ -343,6 +312,11 @@ class _Watch:
             end()
         self._inside.clear()
         self.judge.give_up()
+
+
+def monitors_of(run: Run) -> tuple[Monitors, ...]:
+    """Return all monitors of a run, in this process."""
+    return tuple(vars(run).get("_monitors", ()))
 
 
 def watch(run: Run, *, on_violation: OnViolation = "note", **properties: Property) -> Monitors:

@@ -2,7 +2,7 @@
 
 pages       the page of a run in progress, and its file    observing     data kept of a run, within bounds
 html        the page as text                               pictures      pixels as PNG
-sections    contents that users add to it
+sections    contents that users add to it             judged        monitors and deadlines
 """
 
 from hfg.reporting.pages import ReportPage, report_page

@@ -19,6 +19,8 @@ from hfg.errors import HfgError
 from hfg.graph import Graph
 from hfg.graph.drawing.picture import picture
 from hfg.graph.drawing.text import escaped
+from hfg.monitors.watching import Monitors
+from hfg.reporting.judged import budgets_section, monitors_section
 from hfg.reporting.observing import MOST_NODES, SPANS, Observed
 from hfg.reporting.pictures import png
 
@@ -56,6 +58,7 @@ class Page:
       when: seconds since 1970 at its start; None in virtual time, so that equal runs have equal pages.
       own: sections that users have added, as HTML.
       refused: why nodes cannot be fused, by path (`Run.explain`).
+      judged: the monitors of the run.
     """
 
     def __init__(
@@ -70,10 +73,11 @@ class Page:
         when: float | None,
         own: Sequence[str] = (),
         refused: Mapping[str, str] | None = None,
+        judged: Sequence[Monitors] = (),
     ) -> None:
         self.graph, self.drawn, self.own, self.refused = graph, drawn, own, refused or {}
         self.observed, self.report, self.statistics = observed, report, statistics
-        self.error, self.when = error, when
+        self.error, self.when, self.judged = error, when, judged
         self.outcome = outcome or "still running"
         self.begun_at = observed.begun_at or 0.0
         self.notes: list[str] = []  # what the page leaves out
@@ -88,7 +92,9 @@ class Page:
             *self.own,
             *self._drawing(),
             *self._timeline(),
+            *monitors_section(self.judged, self.begun_at, self.report.duration_s),
             *self._errors(),
+            *budgets_section(self.graph, self.statistics),
             *self._pictures(),
             *self._nodes(),
             *self._edges(),

@@ -14,6 +14,7 @@ from hfg.base.logs import Log
 from hfg.base.whole import need_writable, write_whole
 from hfg.engine import Run, VirtualTimeLoop
 from hfg.errors import UsageError
+from hfg.monitors.watching import monitors_of
 from hfg.reporting.html import Page, drawing
 from hfg.reporting.observing import Observed
 from hfg.reporting.sections import Sections
@@ -80,6 +81,7 @@ class ReportPage(Sections):
             self._when,
             self.sections(),
             refused,
+            monitors_of(run),
         ).text()
 
 

@@ -10,6 +10,7 @@
     invariants     what holds in every run
     activity       play a counter-example of the analysis of activity in the engine
     exploring      run a graph under many schedules, give the smallest that fails
+    judging        run a graph under monitors
     strategies     Hypothesis: graphs, tokens, schedules      making, plans: their basis
     nodes          small deterministic node types
     reference      the oracle: the rules as a machine of permitted moves
@@ -30,6 +31,7 @@ from hfg.testing.activity import ActivityReplay, replay_activity
 from hfg.testing.conformance import Divergence, Replay, replay
 from hfg.testing.exploring import Exploration, ScheduleFailure, explore
 from hfg.testing.firing import Firing, fire
+from hfg.testing.judging import judge_run
 from hfg.testing.recording import Recorder, recorder
 from hfg.testing.reference import ReferenceMachine, ReferenceReport, reference_run
 
@@ -55,6 +57,7 @@ __all__ = [
     "fire",
     "graphs",
     "invariants",
+    "judge_run",
     "recorder",
     "reference_run",
     "replay",

@@ -5,15 +5,17 @@ from __future__ import annotations
 import inspect
 import random
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import hfg
 from hfg.errors import MonitorViolated, RunError, UsageError, in_words
 from hfg.graph import Graph
+from hfg.monitors import Property, watch
 from hfg.testing.conformance import Divergence, describe, replay
 from hfg.testing.invariants import Invariant, broken, of_graph
+from hfg.testing.judging import properties_of, violated_in
 from hfg.testing.recording import Recorder
 from hfg.testing.reference.structure import dissolve
 from hfg.trace import CallStarted, FiringStarted, TokenDrained
@@ -76,6 +78,7 @@ def explore(
     *,
     runs: int = 100,
     invariants: Iterable[Invariant] | None = None,
+    monitors: Mapping[str, Property | str] | None = None,
     result: Callable[[Recorder], Any] | None = None,
     seed: int = 0,
     until_s: float | None = None,
@@ -89,6 +92,8 @@ def explore(
       runs: number of schedules, at least 1.
       invariants: functions that take a trace and return a description of each problem, or use `assert`. Default: all of
         `hfg.testing.invariants`.
+      monitors: what must hold in every run, by name: properties, or their texts. The monitors that the graph declares
+        judge each run, too. A violation is a failure with the stretch that shows it.
       result: a function that takes a trace and returns what must be the same for every schedule. Default: how the run
         ended and, if the graph has only synchronous edges, the sequences of tokens that were used (rule F7).
       seed: seed of the schedules.
@@ -118,12 +123,13 @@ def explore(
     if result is not None and not callable(result):
         raise UsageError(f"result= is a function that takes a trace, got {result!r:.80}")
     measure = result or _default_result(graph)
+    properties = properties_of(monitors)
     seeds = random.Random(seed)
     outcomes: Counter[str] = Counter()
     first = failing = other = None  # of all traces only these are kept: a thousand do not fit into memory
     failures = 0
     for _ in range(runs):
-        one = _try(build, seeds.randrange(2**31), checks, measure, until_s, conform, debug)
+        one = _try(build, seeds.randrange(2**31), checks, properties, measure, until_s, conform, debug)
         first = first or one
         outcomes[one.outcome] += 1
         if one.wrong:
@@ -213,6 +219,7 @@ def _try(
     build: Callable[[], Graph],
     seed: int,
     checks: list[Invariant],
+    properties: Mapping[str, Property],
     measure: Callable[[Recorder], Any],
     until_s: float | None,
     conform: bool,
@@ -222,11 +229,19 @@ def _try(
     outcome, failed = "failed", ""
     wrong: list[str] = []
     options: dict[str, Any] = {"policy": "random", "seed": seed, "until_s": until_s, "trace": trace, "debug": debug}
+    runs: list[hfg.Run] = []
+
+    def begin(run: hfg.Run) -> None:
+        runs.append(run)
+        if properties:
+            watch(run, on_violation="note", **properties)
+
     try:
-        outcome = hfg.run(build(), clock="virtual", **options).outcome
+        outcome = hfg.run(build(), clock="virtual", begin=begin, **options).outcome
     except RunError as error:
         outcome, failed = trace.outcome or type(error).__name__, str(error)
         wrong = [failed] if isinstance(error, MonitorViolated) else []
+    wrong = [said for run in runs for said in violated_in(run)] or wrong  # facts of the graph are not monitors
     wrong += broken(trace, checks)
     if conform and not wrong:
         try:

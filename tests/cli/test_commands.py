@@ -539,3 +539,36 @@ def test_check_time_bounds_ways_and_lists_what_it_assumes(hfg: Command) -> None:
         "assumptions",
         "problems",
     }
+
+
+def test_a_run_measures_a_profile_with_which_check_bounds_ways(hfg: Command) -> None:
+    assert hfg("run", TARGET, "--clock", "virtual", "--profile", "halves.json").code == 0
+    nodes = json.loads(Path("halves.json").read_text())["nodes"]
+    assert all(one["max_s"] > 0 for one in nodes.values())
+    shown = hfg("check", TARGET, "--time", "--profile", "halves.json")
+    assert shown.code == 0
+    assert "no time for" not in shown.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--profile", "gone.json"), "--profile gone.json has durations for --time, and --time is not given; add it"),
+        (("--time", "--profile", "gone.json"), 'the profile "gone.json" cannot be read: No such file or directory'),
+        (("--time", "--profile", "halves.py"), '"halves.py" is not a profile: '),
+        (("--time", "--profile", "other.json"), 'the profile is of graph "other", and knows no node of graph '),
+    ],
+)
+def test_check_refuses_a_profile_that_it_cannot_use(hfg: Command, arguments: tuple[str, ...], sentence: str) -> None:
+    one = {"count": 1, "mean_s": 0.1, "p99_s": 0.1, "max_s": 0.1}
+    Path("other.json").write_text(json.dumps({"graph": "other", "nodes": {"gone": one}}))
+    shown = hfg("check", TARGET, *arguments)
+    assert shown.code == 2
+    assert shown.err.startswith(f"hfg: {sentence}")
+    assert shown.err.count("\n") == 1
+
+
+def test_a_profile_that_cannot_be_written_is_refused_before_the_run(hfg: Command) -> None:
+    shown = hfg("run", TARGET, "--profile", "gone/halves.json")
+    assert (shown.code, shown.out) == (2, "")
+    assert shown.err == "hfg: the profile cannot be written to gone/halves.json: No such file or directory\n"

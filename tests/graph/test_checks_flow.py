@@ -226,9 +226,9 @@ def test_async_code_in_a_thread_is_an_error_before_anything_runs(graph: Graph) -
 
 
 @pytest.mark.rule("R2")
-def test_a_deadline_that_nobody_looks_at_and_a_policy_that_finds_none_are_hints(graph: Graph) -> None:
+def test_a_priority_that_nobody_looks_at_and_a_policy_that_finds_no_deadline_are_hints(graph: Graph) -> None:
     node, other = graph.add(Need(), deadline_s=0.5), graph.add(Need(), priority=3)
-    assert [(p.path, p.severity) for p in found(graph, "unused-scheduling")] == [("need_2", "hint"), ("need", "hint")]
+    assert [(p.path, p.severity) for p in found(graph, "unused-scheduling")] == [("need_2", "hint")]
     graph.group("urgent", policy="deadline", threads=0)
     assert "no node in it has deadline_s" in found(graph, "unused-scheduling")[-1].what
     graph.group("ranked", policy="priority", threads=0)

@@ -10,7 +10,8 @@ from collections.abc import Iterator
 from types import CodeType, FunctionType
 
 from hfg.errors import Problem
-from hfg.graph.flat import FlatGraph
+from hfg.graph.flat import FlatGraph, FlatNode
+from hfg.graph.flat.deadlines import urgencies
 from hfg.graph.structure.level import inside
 from hfg.graph.structure.naming import suggest
 from hfg.graph.structure.options import NodeOptions
@@ -276,39 +277,41 @@ def concurrent_firings(flat: FlatGraph) -> Iterator[Problem]:
             )
 
 
-_SCHEDULING = {"priority": ("priority", 0), "deadline": ("deadline_s", None)}  # policy: the option it looks at
-
-
 def unused_scheduling(whole: FlatGraph) -> Iterator[Problem]:
-    """Policies without the options they look at, and options that no policy looks at (rule R2)."""
+    """Policies without the options that they look at, and priorities at which no policy looks (rule R2)."""
     said: dict[tuple[str, str], list[str]] = {}  # nodes by group and option
     for flat in whole.walk():
         for node in flat.nodes:
-            for option, default in _SCHEDULING.values():
-                if getattr(node.options, option) != default:
-                    said.setdefault((node.options.group or "loop", option), []).append(node.path)
+            if node.options.priority:
+                said.setdefault((_group(node), "priority"), []).append(node.path)
+        for index in urgencies(flat):
+            said.setdefault((_group(flat.nodes[index]), "deadline_s"), []).append(flat.nodes[index].path)
     for name, group in whole.groups.items():
-        for policy, (option, _) in _SCHEDULING.items():
-            paths = said.get((name, option), [])
-            if group.policy == policy and not paths:
-                yield Problem(
-                    path=name,
-                    severity="hint",
-                    what=f'the policy of this group is "{policy}", but no node in it has {option}',
-                    why="so it is first in, first out (rule R2)",
-                    remedy=f"say {option}= in graph.add, or choose another policy",
-                    check="unused-scheduling",
-                )
-            elif group.policy != policy and paths:
-                yield Problem(
-                    path=paths[0],
-                    severity="hint",
-                    what=f'{option} is set here{_more(len(paths) - 1)}, but the policy of group "{name}" is '
-                    f'"{group.policy}"',
-                    why=f'only policy "{policy}" looks at it (rule R2)',
-                    remedy=f'declare graph.group("{name}", policy="{policy}"), or leave {option} out',
-                    check="unused-scheduling",
-                )
+        option = {"priority": "priority", "deadline": "deadline_s"}.get(group.policy)
+        if option is not None and (name, option) not in said:
+            yield Problem(
+                path=name,
+                severity="hint",
+                what=f'the policy of this group is "{group.policy}", but no node in it has {option}',
+                why="so it is first in, first out (rule R2)",
+                remedy=f"say {option}= in graph.add, or choose another policy",
+                check="unused-scheduling",
+            )
+        paths = said.get((name, "priority"), [])
+        if group.policy != "priority" and paths:
+            yield Problem(
+                path=paths[0],
+                severity="hint",
+                what=f'priority is set here{_more(len(paths) - 1)}, but the policy of group "{name}" is '
+                f'"{group.policy}"',
+                why='only policy "priority" looks at it (rule R2)',
+                remedy=f'declare graph.group("{name}", policy="priority"), or leave priority out',
+                check="unused-scheduling",
+            )
+
+
+def _group(node: FlatNode) -> str:
+    return node.options.group or "loop"
 
 
 def _more(count: int) -> str:

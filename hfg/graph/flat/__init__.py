@@ -1,7 +1,7 @@
 """One graph without subgraphs, as a runner and the checks see it (rule G1).
 
 flat_graph  what it is: plain data       flattening  makes it       order  rings in directed graphs
-cutting     into parts for processes
+cutting     into parts for processes    deadlines   of ways from sources
 """
 
 from hfg.graph.flat.cutting import MAIN, CutEdge, Cutting, cut

@@ -25,6 +25,8 @@ def joined(parts: Sequence[EdgeOptions], outermost: EdgeOptions) -> EdgeOptions:
             said[name] = all(values)
         elif border == "sum":
             said[name] = sum(values)
+        elif border == "least":
+            said[name] = min((value for value in values if value is not None), default=None)
         else:
             said[name] = tuple(chain.from_iterable(values if border == "along" else reversed(values)))
     return msgspec.structs.replace(outermost, **said)

@@ -18,11 +18,11 @@ import msgspec
 from hfg.errors import HfgError
 from hfg.graph.structure.naming import suggest
 
-Border: TypeAlias = Literal["outermost", "every", "sum", "along", "target"]
+Border: TypeAlias = Literal["outermost", "every", "sum", "least", "along", "target"]
 """What holds of an edge that leads through subgraphs, and so is made of several (rule G1).
 
-What the outermost says; that which every one of them says; the sum; all, from source to target; or all, from target to
-source, given to the one at the target when a border is drawn.
+What the outermost says; that which every one of them says; the sum; the least that one says; all, from source to
+target; or all, from target to source, given to the one at the target when a border is drawn.
 """
 
 

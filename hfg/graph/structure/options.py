@@ -47,6 +47,7 @@ class EdgeGiven(TypedDict, Generic[T, O], total=False):
     buffer: int
     initial: Iterable[T]
     through: Iterable[O]
+    deadline_s: float | None
 
 
 def _values(values: Sequence[object]) -> str:
@@ -117,6 +118,17 @@ class EdgeFields(Fields[EdgeGiven[Any, Any]], kw_only=True):
             badge=_count,
         ),
     ] = ()
+    deadline_s: Annotated[
+        float | None,
+        Option(
+            "The latency budget up to the edge's target: how old a token may be when the target is done with it, "
+            "counted from the firing of its source.",
+            above=0,
+            border="least",
+            badge="within {:g} s",
+            rank=2,
+        ),
+    ] = None
 
     def said(self) -> EdgeGiven[Any, Any]:
         """Return the options whose values differ from their defaults, by name."""
@@ -245,7 +257,8 @@ class NodeFields(Fields[NodeGiven], kw_only=True):
     deadline_s: Annotated[
         float | None,
         Option(
-            'The maximum age of the oldest token that the node takes, in a group with policy "deadline" (rule R2).',
+            "How old the data may be when the node is done with it, counted from the firing of the source. Policy "
+            '"deadline" (rule R2) and `hfg check --time` look at it.',
             above=0,
         ),
     ] = None
@@ -277,6 +290,7 @@ class GroupGiven(TypedDict, total=False):
     threads: int | None
     policy: Policy
     seed: int | None
+    deadline_s: float | None
     process: bool
     host: str | None
     ledger: bool | str | os.PathLike[str]
@@ -299,6 +313,14 @@ class GroupFields(Fields[GroupGiven], kw_only=True):
     policy: Annotated[Policy, Option("Which node runs next when several can (rule R2).")] = "fifo"
     seed: Annotated[
         int | None, Option('The seed for policy "random"; by default that of the run.', expects="a whole number")
+    ] = None
+    deadline_s: Annotated[
+        float | None,
+        Option(
+            "The `deadline_s` of each node of the group at which a way ends and where nothing else is declared. "
+            'That of the group "loop" is one for the whole graph: it also holds in groups that declare none.',
+            above=0,
+        ),
     ] = None
     process: Annotated[
         bool,

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-import hfg
 from examples.fetch_delivery.__main__ import app
 from examples.fetch_delivery.machine import Mission, Robot, compare
+from examples.fetch_delivery.machine.conditions import conditions
 from examples.fetch_delivery.machine.driving import Dock, GoTo, Move, Position
 from examples.fetch_delivery.machine.mission import LIMITS, Orders, Senses
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
@@ -358,14 +358,12 @@ class MachineWatch(Watch):
     def _look(self, event: TraceEvent) -> None:
         if isinstance(event, EventTriggered) and event.event.endswith("control.entered"):
             robot, _, _ = event.event.partition("/")
-            self._active[robot] = {}
-            self._enters(robot, event.token.value)
+            self.enters(robot, event.token.value)
 
 
 def watched(seed: int, minutes: float, *faults: Fault) -> MachineWatch:
-    graph = build(seed, kind=Robot, faults=faults)
-    watch = MachineWatch(graph)
-    hfg.run(graph, clock="virtual", until_s=60 * minutes, trace=watch)
+    watch = MachineWatch(build(seed, kind=Robot, faults=faults))
+    watch.carry_out(minutes, conditions)
     return watch
 
 

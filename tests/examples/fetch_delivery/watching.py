@@ -1,14 +1,17 @@
-"""Hold a mission to what must be true at every moment, while it runs."""
+"""Hold a mission to what must be true of it: its monitors, and what only the arena knows."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import hfg
-from examples.fetch_delivery.mission import build
+from examples.fetch_delivery.mission import Robot, build
+from examples.fetch_delivery.mission.conditions import conditions
 from examples.fetch_delivery.world import Simulation
-from examples.fetch_delivery.world.robots import Robot
+from examples.fetch_delivery.world.robots import Robot as Body
+from hfg import monitors as m
 from hfg.trace import (
     ActivityChanged,
     CallEnded,
@@ -20,13 +23,7 @@ from hfg.trace import (
     TraceEvent,
 )
 
-# How long each step may hold the activity: its time-out where it has one, else the moment it takes.
-LONGEST_S = {"go_to/plan": 8.2, "go_to/follow": 60.2, "position": 20.2, "dock": 10.2, "wait": 20.2, "leave": 6.2}
-LONGEST_S |= {"select": 5.2, "view": 5.2, "turn": 15.2, "retreat": 6.2, "settle": 0.7, "advance": 10.2}
-LONGEST_S |= {"read_cube": 10.2}
 STUCK_S = 60.0  # a robot that has neither moved nor changed its step for so long
-STANDING = ("settle", "lamp_on/once/gate", "lamp_on/once/export", "wait", "lamp_off/once/gate", "dark/once/gate")
-
 
 _NOT_WATCHED = "the run was not watched to its end; the log says why"
 
@@ -47,7 +44,6 @@ class Watch:
         self._graph = graph
         self._world: Any = graph["world"]
         self._chosen: dict[int, float] = {}
-        self._active: dict[str, dict[str, float]] = {}
         self._now = 0.0
         self._handed_on: dict[str, str | None] = {}  # by whose firing or call, and by which event, if it has
         self._stirred: dict[str, tuple[float, float, float]] = {}
@@ -85,7 +81,7 @@ class Watch:
 
     def __call__(self, event: TraceEvent) -> None:
         if event.time > self._now:
-            self._time_passes(event.time)
+            self._time_passes()
             self._now = event.time
         if isinstance(event, EventTriggered) and event.event.endswith("localise.found"):
             number = int(event.event[len("robot_")])
@@ -110,16 +106,13 @@ class Watch:
                 self._handed_on[node] = name
 
     def _look(self, event: TraceEvent) -> None:
-        """See which steps are active."""
-        if isinstance(event, ActivityChanged):
+        """See which steps become active."""
+        if isinstance(event, ActivityChanged) and event.active:
             robot, _, step = event.node.partition("/")
-            if event.active:
-                self._enters(robot, step)
-            else:
-                self._active[robot].pop(step, None)
+            self.enters(robot, step)
 
-    def _enters(self, robot: str, step: str) -> None:
-        self._active.setdefault(robot, {})[step] = self._now
+    def enters(self, robot: str, step: str) -> None:
+        """A robot is in a step from now on."""
         self.steps.append((self._now, f"{robot}/{step}"))
         self._stirs(robot)
         if step.endswith("visit/wait"):
@@ -127,7 +120,7 @@ class Watch:
             station = self.simulation.arena.nearest(body.x, body.y)
             self.waits.append((self._now, station.kind, station.number))
 
-    def _body(self, robot: str) -> Robot:
+    def _body(self, robot: str) -> Body:
         return self.simulation.robots[int(robot.removeprefix("robot_"))]
 
     def _stirs(self, robot: str) -> None:
@@ -149,25 +142,26 @@ class Watch:
             if sorted(left) != sorted(cube for _, cube in score.fetched):
                 self.found.append(f"robot_{number} has fetched {score.fetched}, and {left} is what has become of them")
 
-    def _time_passes(self, now: float) -> None:
-        for robot, active in self._active.items():
-            _, x, y = self._stirred[robot]
+    def _time_passes(self) -> None:
+        for robot, (_, x, y) in self._stirred.items():
             body = self._body(robot)
             if math.hypot(body.x - x, body.y - y) > 0.1:
                 self._stirs(robot)
-            if len(active) != 1:
-                self.found.append(f"at {self._now} s {sorted(active)} of {robot} are active, not one step")
-            for step, since in active.items():
-                longest = next((most for name, most in LONGEST_S.items() if step.endswith(name)), None)
-                if longest is not None and now - since > longest:
-                    self.found.append(f"at {now} s {robot}/{step} is active since {since} s")
-                if body.lamp and not step.endswith(STANDING):
-                    self.found.append(f"at {now} s the lamp of {robot} is on in {step}")
+
+    def carry_out(self, minutes: float, conditions: Callable[[hfg.Subgraph], dict[str, m.Property]]) -> None:
+        """Run the mission, in which these must hold of each robot; `found` says what does not."""
+        judged: list[m.Monitors] = []
+
+        def begin(run: hfg.Run) -> None:
+            robots = [node for node in self._graph.nodes.values() if isinstance(node, Robot)]
+            judged.extend(m.watch(run, on_violation="note", **conditions(robot)) for robot in robots)
+
+        hfg.run(self._graph, clock="virtual", until_s=60 * minutes, trace=self, begin=begin)
+        self.found += [str(violation) for monitors in judged for violation in monitors.violations]
 
 
 def watched(seed: int = 1, robots: int = 1, *, minutes: float = 1.0, **options: Any) -> Watch:
-    """Run a mission, and say what it did and what was wrong."""
-    graph = build(seed, robots, **options)
-    watch = Watch(graph)
-    hfg.run(graph, clock="virtual", until_s=60 * minutes, trace=watch)
+    """Run a mission under its monitors, and say what it did and what was wrong."""
+    watch = Watch(build(seed, robots, **options))
+    watch.carry_out(minutes, conditions)
     return watch
