@@ -58,7 +58,7 @@ def urgencies(flat: FlatGraph) -> dict[int, float]:
         while waiting:
             for edge in into.get(waiting.pop(), ()):
                 before = edge.source.node
-                if before not in found:
+                if before >= 0 and before not in found:
                     found[before] = found[index]
                     waiting.append(before)
     return found
@@ -69,7 +69,7 @@ def _edges(flat: FlatGraph) -> tuple[dict[int, list[FlatEdge]], set[int]]:
     into: dict[int, list[FlatEdge]] = {}
     senders = set()
     for edge in flat.edges:
-        if edge.source.node >= 0 and edge.target.node >= 0:
+        if edge.target.node >= 0:
             into.setdefault(edge.target.node, []).append(edge)
             senders.add(edge.source.node)
     return into, senders
