@@ -24,7 +24,7 @@ The tutorial is docs/tutorial.md. `import hfg` is fast, because each name is imp
 For developers: these are the layers of the package. Imports go down only. Layers 0 to 3 build graphs without an
 engine; code that waits starts in layer 5.
 
-    7  cli      studio    composing
+    7  cli      studio    composing   comparing
     6  nodes    files   recording   reporting   parts   catalogue   monitors   tuning   also: testing
     5  engine   links.running                             outside: hfg_transports (imports layers 0-1 only)
     4  activity   analysis   links   timeline

@@ -57,6 +57,7 @@ FLOORS = {
     "hfg.monitors.properties": 2,
     "hfg.monitors.parsing": 2,
     "hfg.tuning": 6,
+    "hfg.comparing": 7,
     "hfg.cli": 7,
     "hfg.studio": 7,
     "hfg.composing": 7,  # puts what stands high where lower floors ask for it
@@ -68,6 +69,7 @@ FIRST_FLOOR_THAT_WAITS = 5
 SAME_FLOOR_FREE = {0, 2}  # one vocabulary each: what everybody speaks of, and what a node type is
 SAME_FLOOR_PAIRS = {
     ("hfg.cli", "hfg.studio"),
+    ("hfg.cli", "hfg.comparing"),
     ("hfg.composing", "hfg.studio"),
     ("hfg.engine", "hfg.links.running"),
     ("hfg.links.pubsub", "hfg.links.running"),
@@ -77,6 +79,7 @@ SAME_FLOOR_PAIRS = {
     ("hfg.tuning", "hfg.monitors"),  # constraints of a search
     ("hfg.reporting", "hfg.monitors"),  # their violations are part of a page
     ("hfg.nodes", "hfg.recording"),  # a family of it is made there
+    ("hfg.nodes", "hfg.tuning"),  # methods of search, and statistics
     ("hfg.files", "hfg.catalogue"),  # which packages a graph file may name
     ("hfg.parts", "hfg.files"),  # a graph goes to another process as the text of a file
 }

@@ -41,6 +41,7 @@ INVENTED = {
     "file.py",
     "filters.py",
     "halves.py",
+    "hill.py",
     "note.txt",
     "steps.py",
     "ways.svg",

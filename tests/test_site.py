@@ -30,8 +30,8 @@ from tools.browser import CHROMIUM, browsers
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
-MODULES = ["activity", "errors", "geometry", "images", "monitors", "panels", "recording", "registry", "tuning"]
-MODULES += ["testing", "timeline", "trace", "transport", "types"]
+MODULES = ["activity", "comparing", "errors", "geometry", "images", "monitors", "panels", "recording", "registry"]
+MODULES += ["testing", "timeline", "trace", "transport", "tuning", "types"]
 
 
 # --- the settings, without a build ------------------------------------------------------------------------------------

@@ -40,6 +40,9 @@ FaultOption = Annotated[
 ProcessesOption = Annotated[
     int | None, typer.Option(min=1, help="How many runs at a time; the result does not depend on it.")
 ]
+JournalOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Keep all runs there, and continue from them if it exists.")
+]
 PatienceOption = Annotated[
     float | None, typer.Option(metavar="SECONDS", min=0.01, help="End a run that takes longer than this to compute.")
 ]
@@ -122,7 +125,7 @@ def usage() -> Iterator[None]:
 
 
 @contextmanager
-def progress(total: int) -> Iterator[Callable[[Told, str], None]]:
+def progress(total: int | None) -> Iterator[Callable[[Told, str], None]]:
     """Show a bar on a terminal; elsewhere nothing. The yielded function takes a run, and what is best so far."""
     if not is_terminal(sys.stderr):
         yield lambda told, words: None

@@ -30,12 +30,14 @@ def sweep(
     until: UntilOption = None,
     processes: search.ProcessesOption = None,
     patience: search.PatienceOption = None,
+    journal: search.JournalOption = None,
     arg: ArgOption = None,
     allow: AllowOption = None,
     json: Annotated[bool, typer.Option("--json", help="Write the table as JSON.")] = False,
 ) -> int:
     """Run a graph with every combination of values, faults and seeds; show means with 95 % confidence intervals."""
-    with search.usage():
+    search.need_place(journal)
+    with search.usage(), search.progress(None) as tell:
         found = sweep_graph(
             search.builder(target, arg, allow),
             parameter or [],
@@ -46,7 +48,9 @@ def sweep(
             constraints=search.constraints_of(constraint),
             until_s=until,
             processes=processes,
+            journal=journal,
             patience_s=patience,
+            told=lambda run: tell(run, ""),
         )
     if json:
         show.json(found.as_data())

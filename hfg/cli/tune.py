@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import operator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +12,7 @@ import typer
 from hfg.cli import search, show
 from hfg.cli.options import AllowOption, ArgOption, TargetArgument, UntilOption
 from hfg.errors import TargetError
-from hfg.tuning import Confirmation, Evaluation, Told, Tuning
+from hfg.tuning import Confirmation, Evaluation, Mean, Told, Tuning
 from hfg.tuning import tune as tune_graph
 
 
@@ -41,9 +43,7 @@ def tune(
     until: UntilOption = None,
     processes: search.ProcessesOption = None,
     patience: search.PatienceOption = None,
-    journal: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Keep all runs there, and continue from them if it exists.")
-    ] = None,
+    journal: search.JournalOption = None,
     confirm: Annotated[
         str | None, typer.Option(metavar="LIST", help="Afterwards, compare with the values before on these new seeds.")
     ] = None,
@@ -54,20 +54,13 @@ def tune(
 ) -> int:
     """Search for the parameters of a graph that make a score smallest or largest."""
     search.need_place(plot)
+    search.need_place(journal)
     every = search.seeds_of(seeds)
     again = search.seeds_of(confirm)
     if set(every) & set(again):
         raise TargetError("--confirm names seeds that the search uses, too: name others")
-    best: list[Evaluation] = []
     with search.usage(), search.progress(evaluations * max(len(every), 1)) as tell:
-
-        def told(run: Told) -> None:
-            tell(run, f"best so far: {best[0].means[0]}" if best else "")
-
-        def candidate(one: Evaluation) -> None:
-            if not one.failed and (not best or _is_better(one, best[0], minimize)):
-                best[:] = [one]
-
+        best = _Best(tell, smaller=bool(minimize))
         found = tune_graph(
             search.builder(target, arg, allow),
             parameter,
@@ -84,8 +77,8 @@ def tune(
             processes=processes,
             journal=journal,
             patience_s=patience,
-            tell=candidate,
-            told=told,
+            tell=best.take,
+            told=best.tell,
         )
         confirmed = found.confirm(again) if again and not found.best.failed else None
     if plot is not None:
@@ -100,9 +93,22 @@ def tune(
     return 1 if found.best.failed else 0
 
 
-def _is_better(one: Evaluation, other: Evaluation, minimize: list[str] | None) -> bool:
-    ahead = one.means[0].value < other.means[0].value
-    return ahead if minimize else one.means[0].value > other.means[0].value
+class _Best:
+    """The best candidate so far, by the first score; the progress bar shows it."""
+
+    def __init__(self, tell: Callable[[Told, str], None], *, smaller: bool) -> None:
+        self._tell = tell
+        self._better = operator.lt if smaller else operator.gt
+        self._mean: Mean | None = None
+
+    def take(self, one: Evaluation) -> None:
+        """Take in a candidate."""
+        if not one.failed and (self._mean is None or self._better(one.means[0].value, self._mean.value)):
+            self._mean = one.means[0]
+
+    def tell(self, run: Told) -> None:
+        """Move the bar on by a run."""
+        self._tell(run, "" if self._mean is None else f"best so far: {self._mean}")
 
 
 def _said(found: Tuning, confirmed: Confirmation) -> str:

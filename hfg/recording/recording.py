@@ -335,6 +335,15 @@ def _listed(known: dict[str, Any]) -> str:
     return ", ".join(names[:12]) + (f" and {more} more" if more > 0 else "") if names else "none"
 
 
+def is_recordable(path: str, hint: Any) -> bool:
+    """Return whether values of a port can be data, as far as its type tells."""
+    try:
+        _need_data(path, hint, may_pickle=False)
+    except UsageError:
+        return False
+    return True
+
+
 def _need_data(path: str, hint: Any, may_pickle: bool) -> None:
     """Refuse a port whose values can never be written."""
     if may_pickle or not isinstance(hint, type) or hint in (object, Any):

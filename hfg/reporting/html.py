@@ -100,18 +100,13 @@ class Page:
             *self._edges(),
             *self._groups(),
         ]
-        title = f"Run of {self.graph.name}"
-        yield '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        yield f'<meta http-equiv="Content-Security-Policy" content="{_RULES}">\n'
-        yield '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        yield f"<title>{escaped(title)}</title>\n<style>\n{_file('page.css')}</style>\n</head>\n<body>\n<header>\n"
-        yield f"<h1>{escaped(title)}</h1>\n"
+        yield from _head(f"Run of {self.graph.name}")
         yield from self._summary()
         yield "</header>\n<main>\n"
         yield from body
         yield from self._left_out()
         yield f'</main>\n<script type="application/json" id="data">{_json(self._data())}</script>\n'
-        yield f"<script>\n{_file('page.js')}</script>\n</body>\n</html>\n"
+        yield f"<script>\n{_file('tables.js')}{_file('page.js')}</script>\n</body>\n</html>\n"
 
     # --- how it went
 
@@ -299,6 +294,25 @@ class Page:
             yield '<section id="left_out"><h2>What this page leaves out</h2>\n<ul>\n'
             yield from (f"<li>{escaped(note)}</li>\n" for note in self.notes)
             yield "</ul>\n</section>\n"
+
+
+def plain_page(title: str, sections: Iterable[str]) -> str:
+    """Return a page of sections that is not about one run.
+
+    Args:
+      title: on top of it.
+      sections: as HTML.
+    """
+    script = f"<script>\n{_file('tables.js')}</script>\n</body>\n</html>\n"
+    return "".join([*_head(title), "</header>\n<main>\n", *sections, "</main>\n", script])
+
+
+def _head(title: str) -> Iterator[str]:
+    yield '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+    yield f'<meta http-equiv="Content-Security-Policy" content="{_RULES}">\n'
+    yield '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+    yield f"<title>{escaped(title)}</title>\n<style>\n{_file('page.css')}</style>\n</head>\n<body>\n<header>\n"
+    yield f"<h1>{escaped(title)}</h1>\n"
 
 
 def _file(name: str) -> str:

@@ -8,11 +8,12 @@ losses      which candidate is better                   figures     means and th
 scores      what a run is judged by                     happenings  what happens in a run
 evaluating  one run of one candidate                    searching   many, with what they cost
 workers     the processes                               journal     a line for each run
-plotting    drawings
+judging     one candidate after the other, for nodes     plotting    drawings
 """
 
 from hfg.tuning.evaluating import Told
 from hfg.tuning.figures import Mean, mean_of, paired
+from hfg.tuning.judging import Judge
 from hfg.tuning.scores import Finished
 from hfg.tuning.searching import Evaluation
 from hfg.tuning.space import read_parameter
@@ -23,6 +24,7 @@ __all__ = [
     "Confirmation",
     "Evaluation",
     "Finished",
+    "Judge",
     "Mean",
     "Sweep",
     "Told",

@@ -62,7 +62,7 @@ class Problem:
       seed_paths: the parameters that get the seed.
       until_s: each run ends at this time; None: by itself.
       constraints: monitors that must hold.
-      happenings: what happens in each run.
+      happenings: what may happen; a candidate names one.
     """
 
     build: Callable[[], Graph]
@@ -98,13 +98,16 @@ def seed_parameters(graph: Graph, said: str | None) -> list[str]:
     return found
 
 
-def evaluate(problem: Problem, values: Mapping[str, Any], seed: int | None) -> Told:
+def evaluate(
+    problem: Problem, values: Mapping[str, Any], seed: int | None, also: Callable[[Run], object] | None = None
+) -> Told:
     """Run a candidate once. An error of the run is in the result.
 
     Args:
       problem: what is searched for.
       values: of the parameters, by path.
       seed: of the run, and of the modules random and numpy.random. None: parameters stay as they are.
+      also: called with the run before its nodes are set up.
     """
     began = time.perf_counter()
     listening: list[Listening] = []
@@ -119,8 +122,8 @@ def evaluate(problem: Problem, values: Mapping[str, Any], seed: int | None) -> T
         properties = problem.properties()
         if properties:
             watch(one, on_violation="fail", **properties)
-        for happening in problem.happenings:
-            happening.begin(one)
+        if also is not None:
+            also(one)
 
     def told(outcome: Outcome, scores: Sequence[float] = (), why: str = "") -> Told:
         simulated_s = runs[0].elapsed() if runs else 0.0

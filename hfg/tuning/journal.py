@@ -121,6 +121,11 @@ class Journal:
         if self._file is not None:
             self._write(line)
 
+    @property
+    def files(self) -> list[int]:
+        """The open file. Forked processes close it, because its lock lasts as long as a process has it open."""
+        return [] if self._file is None else [self._file.fileno()]
+
     def close(self) -> None:
         """Close the file."""
         if self._file is not None:

@@ -36,7 +36,7 @@ ScoreLike: TypeAlias = str | Callable[[Finished], float]
 """A score as users name it: a text, or a function of the finished run."""
 
 
-class _Passed:
+class Passed:
     """Statistics of the values that have passed a port."""
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ class _Passed:
         """See `Looker` of the engine."""
 
 
-STATISTICS: Final[dict[str, Callable[[_Passed], float]]] = {
+STATISTICS: Final[dict[str, Callable[[Passed], float]]] = {
     "last": lambda passed: passed.last,
     "mean": lambda passed: passed.total / passed.count,
     "mean_size": lambda passed: passed.sizes / passed.count,
@@ -121,7 +121,7 @@ class Listening:
 
     def __init__(self, run: Run, scores: list[Score]) -> None:
         self._run, self._scores = run, scores
-        self._passed: dict[str, tuple[_Passed, str]] = {}
+        self._passed: dict[str, tuple[Passed, str]] = {}
         for score in scores:
             if score.function is None:
                 self._find(score.name)
@@ -203,7 +203,7 @@ class Listening:
         return not attribute.startswith("_") and hasattr(node, attribute)
 
     def _listen(self, name: str, path: str, statistic: str) -> None:
-        looker = _Passed()
+        looker = Passed()
         try:
             port = self._run.graph[path]
             taps = self._run._parts.taps

@@ -6,7 +6,7 @@ Depends on `evaluating`, `workers` and `journal`.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any
@@ -31,11 +31,13 @@ class Candidate:
       number: from 0.
       at: numbers from 0 to 1, for the journal.
       values: of the parameters, by path.
+      happening: the number of what happens in its runs; -1 for nothing.
     """
 
     number: int
     at: Sequence[float]
     values: Mapping[str, Any]
+    happening: int = -1
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,13 @@ class Effort:
     worked_s: float = 0.0
     took_s: float = 0.0
 
+    def add(self, told: Told, waited_s: float) -> None:
+        """Count one more run, and how long its result was waited for."""
+        self.runs += 1
+        self.simulated_s += told.simulated_s
+        self.worked_s += told.took_s
+        self.took_s += waited_s
+
     def __str__(self) -> str:
         """Say it in a line."""
         if not self.runs:
@@ -139,9 +148,8 @@ class Searching:
     effort: Effort = field(default_factory=Effort)
 
     def __post_init__(self) -> None:
-        self._candidates: dict[int, Candidate] = {}
+        self._known: dict[bytes, Told] = {}
         self._workers: Workers | None = None
-        self._began = time.monotonic()
 
     def __enter__(self) -> Searching:
         return self
@@ -155,20 +163,20 @@ class Searching:
         self.journal.close()
 
     def evaluate(self, candidates: Sequence[Candidate]) -> list[Evaluation]:
-        """Evaluate candidates, as many runs at a time as there are processes."""
+        """Evaluate candidates, as many runs at a time as there are processes; equal runs are carried out once."""
+        runs = [(one, seed, self._task(one, seed)) for one in candidates for seed in self.seeds]
+        lines = [self.journal.find(one.number, seed, one.at) for one, seed, _ in runs]
+        for (_, _, task), line in zip(runs, lines, strict=True):
+            if line is not None:
+                self._known[task] = Told(line.outcome, line.scores, line.why, line.simulated_s)
+        missing = dict.fromkeys(task for _, _, task in runs if task not in self._known)
+        results = self._started().in_order(missing) if missing else iter(())
         found: dict[tuple[int, Seed], Told] = {}
-        missing: list[tuple[Candidate, Seed]] = []
-        for candidate in candidates:
-            for seed in self.seeds:
-                line = self.journal.find(candidate.number, seed, candidate.at)
-                if line is None:
-                    missing.append((candidate, seed))
-                else:
-                    told = Told(line.outcome, line.scores, line.why, line.simulated_s)
-                    found[candidate.number, seed] = told
-                    self.told(told)
-        if missing:
-            self._run(missing, found)
+        for (candidate, seed, task), line in zip(runs, lines, strict=True):
+            told = found[candidate.number, seed] = self._told(candidate, task, results)
+            if line is None:
+                self.journal.add(self._line(candidate, seed, told))
+            self.told(told)
         return [self._evaluation(one, {seed: found[one.number, seed] for seed in self.seeds}) for one in candidates]
 
     def loss(self, evaluation: Evaluation) -> Loss:
@@ -178,49 +186,42 @@ class Searching:
         pairs = zip(self.problem.scores, evaluation.means, strict=True)
         return Loss(0.0, tuple(score.loss(mean.value) for score, mean in pairs))
 
-    def _run(self, missing: list[tuple[Candidate, Seed]], found: dict[tuple[int, Seed], Told]) -> None:
+    def _task(self, candidate: Candidate, seed: Seed) -> bytes:
+        return msgspec.json.encode((self._plain(candidate), seed, candidate.happening))
+
+    def _told(self, candidate: Candidate, task: bytes, results: Iterator[bytes | Died]) -> Told:
+        """Return what is known of a run, or wait for the next result, which is that of the run."""
+        if task in self._known:
+            return self._known[task]
         began = time.monotonic()
-        tasks = [msgspec.json.encode((list(one.at), self._plain(one), seed)) for one, seed in missing]
-        results = self._started().in_order(tasks)
-        for (candidate, seed), result in zip(missing, results, strict=True):
-            if isinstance(result, Died):
-                told = Told("late" if result.late else "crashed", why=str(result))
-            else:
-                told = msgspec.json.decode(result, type=Told)
-            if told.outcome == "refused" and candidate.number == 0:
-                raise UsageError(told.why)  # the values are not the reason
-            found[candidate.number, seed] = told
-            self.journal.add(
-                Line(
-                    candidate.number,
-                    seed,
-                    list(candidate.at),
-                    told.outcome,
-                    told.scores,
-                    told.why,
-                    told.simulated_s,
-                    self._plain(candidate),
-                )
-            )
-            self.effort.runs += 1
-            self.effort.simulated_s += told.simulated_s
-            self.effort.worked_s += told.took_s
-            self.effort.took_s += time.monotonic() - began
-            began = time.monotonic()
-            self.told(told)
+        result = next(results)
+        if isinstance(result, Died):
+            told = Told("late" if result.late else "crashed", why=str(result))
+        else:
+            told = msgspec.json.decode(result, type=Told)
+        if told.outcome == "refused" and candidate.number == 0:
+            raise UsageError(told.why)  # the values are not the reason
+        self._known[task] = told
+        self.effort.add(told, time.monotonic() - began)
+        return told
+
+    def _line(self, candidate: Candidate, seed: Seed, told: Told) -> Line:
+        said = (told.outcome, told.scores, told.why, told.simulated_s)
+        return Line(candidate.number, seed, list(candidate.at), *said, self._plain(candidate))
 
     def _started(self) -> Workers:
         """Return the processes; they are started when the first of them is needed."""
         if self._workers is None:
-            self._workers = Workers(self._work, self.processes, self.patience_s)
+            self._workers = Workers(self._work, self.processes, self.patience_s, apart=self.journal.files)
             self._workers.__enter__()
         return self._workers
 
     def _work(self, task: bytes) -> bytes:
         """Do this in a process of its own."""
-        _, plain, seed = msgspec.json.decode(task)
+        plain, seed, number = msgspec.json.decode(task)
         values = {one.path: one.spec.decode(plain[one.path]) for one in self.problem.space.tuned}
-        return msgspec.json.encode(evaluate(self.problem, values, seed))
+        also = self.problem.happenings[number].begin if number >= 0 else None
+        return msgspec.json.encode(evaluate(self.problem, values, seed, also))
 
     def _plain(self, candidate: Candidate) -> dict[str, Any]:
         return self.problem.space.as_data(candidate.values)

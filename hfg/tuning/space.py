@@ -232,6 +232,21 @@ def read_parameter(graph: Graph, text: str) -> Tuned:
     return tuned
 
 
+def read_range(name: str, text: str) -> Tuned:
+    """Read the range of a number that does not belong to a parameter, as in "0.1..10".
+
+    Args:
+      name: for messages.
+      text: as after "=" in `read_parameter`.
+
+    Raises:
+      UsageError: it is not a range of numbers.
+    """
+    spec = ParameterSpec(name, float, 0.0)
+    cells, make, take = _Reading(name, spec, text.strip()).read()
+    return Tuned(name, (name,), spec, cells, make, take)
+
+
 def _check_ends(tuned: Tuned, specs: Sequence[ParameterSpec]) -> None:
     """Refuse a range that reaches beyond the limits of the declaration."""
     for unit in (0.0, 1.0):

@@ -7,19 +7,19 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 from hfg.errors import UsageError
 from hfg.graph import Graph
 from hfg.tuning.evaluating import Constraints, Problem, Told, seed_parameters
 from hfg.tuning.happenings import read_happening
-from hfg.tuning.journal import Journal
 from hfg.tuning.scores import Score, ScoreLike
 from hfg.tuning.searching import Candidate, Effort, Evaluation, Searching
 from hfg.tuning.space import Space, Tuned, read_parameter
-from hfg.tuning.tuning import built, header_of, read_scores, read_seeds
+from hfg.tuning.tuning import built, header_of, journal_at, read_scores, read_seeds
 from hfg.tuning.workers import usual_processes
 
 _MOST_ROWS: Final = 100_000
@@ -108,6 +108,7 @@ def sweep(
     constraints: Constraints | None = None,
     until_s: float | None = None,
     processes: int | None = None,
+    journal: str | os.PathLike[str] | None = None,
     patience_s: float | None = None,
     told: Callable[[Told], object] | None = None,
 ) -> Sweep:
@@ -123,6 +124,7 @@ def sweep(
       constraints: monitors; a run that violates one has no score.
       until_s: ends each run.
       processes: how many runs at a time.
+      journal: a file for all runs, from which a sweep that was killed continues.
       patience_s: a run that takes longer on the clock of the wall is ended.
       told: called with each run.
 
@@ -131,26 +133,32 @@ def sweep(
 
     Raises:
       UsageError: a parameter, fault, score or option does not fit, or there are too many combinations.
+      OSError: the journal cannot be used.
     """
     graph = built(build)
-    tuned = [read_parameter(graph, one) for one in parameters]
-    happenings = [None, *(read_happening(graph, one) for one in faults)]
-    combinations = _combinations(tuned, _MOST_ROWS // len(happenings))
-    every, rows = read_seeds(seeds), list[Row]()
+    space = Space(read_parameter(graph, one) for one in parameters)
+    happenings = [read_happening(graph, one) for one in faults]
+    combinations = _combinations(space.tuned, _MOST_ROWS // (1 + len(happenings)))
+    every, judged = read_seeds(seeds), read_scores(scores, ())
     paths = seed_parameters(graph, seed_parameter) if seeds else []
-    judged = read_scores(scores, ())
-    problem = Problem(build, Space(tuned), judged, paths, until_s, constraints or {})
-    effort = Effort()
-    for happening in happenings:
-        one = problem if happening is None else replace(problem, happenings=[happening])
-        notebook = Journal(None, header_of(one, [], "sweep", 0, None, every, graph.name))
-        with Searching(
-            one, every, notebook, processes or usual_processes(), patience_s, told or (lambda _: None), effort
-        ) as searching:
-            candidates = [Candidate(n, at, one.space.values(at)) for n, at in enumerate(combinations)]
-            found = searching.evaluate(candidates)
-        rows += [Row("" if happening is None else happening.name, each.over_good(len(judged))) for each in found]
-    return Sweep(judged, tuned, rows, effort)
+    problem = Problem(build, space, judged, paths, until_s, constraints or {}, happenings)
+    header = header_of(problem, parameters, "sweep", 0, None, every, graph.name)
+    candidates = [
+        Candidate(number, at, space.values(at), happening)
+        for number, (happening, at) in enumerate(itertools.product(range(-1, len(happenings)), combinations))
+    ]
+    with Searching(
+        problem,
+        every,
+        journal_at(journal, header),
+        processes or usual_processes(),
+        patience_s,
+        told or (lambda _: None),
+    ) as searching:
+        found = searching.evaluate(candidates)
+    names = [*(one.name for one in happenings), ""]  # the last for -1
+    rows = [Row(names[one.candidate.happening], one.over_good(len(judged))) for one in found]
+    return Sweep(judged, space.tuned, rows, searching.effort)
 
 
 def _combinations(tuned: Sequence[Tuned], most: int) -> list[list[float]]:

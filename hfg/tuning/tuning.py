@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -18,7 +18,7 @@ from hfg.tuning.evaluating import Constraints, Problem, Told, seed_parameters
 from hfg.tuning.figures import Mean, paired
 from hfg.tuning.journal import Header, Journal
 from hfg.tuning.losses import best_first, front
-from hfg.tuning.methods import make_method
+from hfg.tuning.methods import Method, make_method
 from hfg.tuning.plotting import plot
 from hfg.tuning.scores import Score, ScoreLike, read_score
 from hfg.tuning.searching import Candidate, Effort, Evaluation, Searching
@@ -109,7 +109,7 @@ class Tuning:
         again = Searching(
             known.problem,
             read_seeds(seeds),
-            Journal(None, header_of(known.problem, [], "", 0, None, [])),
+            journal_at(None, header_of(known.problem, [], "", 0, None, [])),
             processes or known.processes,
             known.patience_s,
         )
@@ -203,43 +203,49 @@ def tune(
       OSError: the journal cannot be used.
     """
     graph = built(build)
-    scores = read_scores(minimize, maximize)
     space = Space(read_parameter(graph, one) for one in parameters)
     if not space.tuned:
         raise UsageError("there is nothing to search: name at least one parameter, as in pid.kp=0..10")
+    _need_count("evaluations", evaluations, "how many candidates to try")
+    if batch is not None:
+        _need_count("batch", batch, "how many candidates a generation has")
     every = read_seeds(seeds)
     paths = seed_parameters(graph, seed_parameter) if seeds else []
-    problem = Problem(build, space, scores, paths, until_s, constraints or {})
-    if type(evaluations) is not int or evaluations < 1:
-        raise UsageError(f"evaluations= is how many candidates to try, 1 at least, got {evaluations!r}")
-    if batch is not None and (type(batch) is not int or batch < 1):
-        raise UsageError(f"batch= is how many candidates a generation has, 1 at least, got {batch!r}")
+    problem = Problem(build, space, read_scores(minimize, maximize), paths, until_s, constraints or {})
     present = space.present(graph)
     first = space.units(present)
-    search = make_method(method, space.cells, seed=seed, batch=batch, first=first, scores=len(scores))
-    header = header_of(problem, list(parameters), method, seed, batch, every, graph.name)
-    notebook = Journal(None if journal is None else Path(journal), header)
-    done: list[Evaluation] = []
+    search = make_method(method, space.cells, seed=seed, batch=batch, first=first, scores=len(problem.scores))
+    header = header_of(problem, parameters, method, seed, batch, every, graph.name)
+    before = Candidate(0, [-1.0] * len(space.cells) if first is None else first, present)
+    with Searching(
+        problem, every, journal_at(journal, header), processes or usual_processes(), patience_s, told or _ignore
+    ) as searching:
+        return Tuning(searching, list(_searched(searching, search, before, evaluations, tell or _ignore)))
 
-    def evaluate(candidates: list[Candidate]) -> list[Evaluation]:
-        found = searching.evaluate(candidates)
-        done.extend(found)
-        for one in found if tell is not None else ():
-            assert tell is not None
+
+def _searched(
+    searching: Searching, search: Method, before: Candidate, most: int, tell: Callable[[Evaluation], object]
+) -> Iterator[Evaluation]:
+    """Yield the evaluation of the values before, then those of one generation after the other."""
+    first, count = [before], 0
+    while count < most:
+        asked = search.ask()
+        some = asked[: most - count - len(first)]
+        at = count + len(first)
+        candidates = [Candidate(at + i, one, searching.problem.space.values(one)) for i, one in enumerate(some)]
+        found = searching.evaluate([*first, *candidates])
+        for one in found:
             tell(one)
-        return found
+            yield one
+        if not asked or len(some) < len(asked):
+            return
+        search.tell(asked, [searching.loss(one) for one in found[len(first) :]])
+        first, count = [], at + len(some)
 
-    with Searching(problem, every, notebook, processes or usual_processes(), patience_s, told or _ignore) as searching:
-        evaluate([Candidate(0, [-1.0] * len(space.cells) if first is None else first, present)])
-        while len(done) < evaluations:
-            asked = search.ask()
-            if not asked:
-                break
-            some = asked[: evaluations - len(done)]
-            found = evaluate([Candidate(len(done) + i, one, space.values(one)) for i, one in enumerate(some)])
-            if len(some) == len(asked):
-                search.tell(asked, [searching.loss(one) for one in found])
-    return Tuning(searching, done)
+
+def _need_count(name: str, value: object, what: str) -> None:
+    if type(value) is not int or value < 1:
+        raise UsageError(f"{name}= is {what}, 1 at least, got {value!r}")
 
 
 def built(build: Callable[[], Graph]) -> Graph:
@@ -289,9 +295,19 @@ def read_seeds(seeds: Sequence[int]) -> list[int | None]:
     return [*found] if found else [None]
 
 
+def journal_at(path: str | os.PathLike[str] | None, header: Header) -> Journal:
+    """Open the journal of a search.
+
+    Raises:
+      UsageError: it is the journal of another search, or no journal.
+      OSError: it cannot be read or written.
+    """
+    return Journal(None if path is None else Path(path), header)
+
+
 def header_of(
     problem: Problem,
-    parameters: list[str],
+    parameters: Sequence[str],
     method: str,
     seed: int,
     batch: int | None,
@@ -302,7 +318,7 @@ def header_of(
     return Header(
         journal=_FORM,
         graph=graph,
-        parameters=parameters,
+        parameters=list(parameters),
         scores=[f"{'maximize' if one.maximize else 'minimize'} {one.name}" for one in problem.scores],
         seeds=seeds,
         constraints=list(_names(problem.properties())),
@@ -318,5 +334,5 @@ def _names(properties: Mapping[str, Any]) -> list[str]:
     return [f"{name}: {what}" for name, what in properties.items()]
 
 
-def _ignore(told: Told) -> None:
+def _ignore(told: object) -> None:
     """Do nothing."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import signal
-import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,8 +18,6 @@ from hfg.tuning import Tuning, mean_of, read_parameter, sweep, tune
 from hfg.tuning.losses import Loss, best_first, front
 from hfg.tuning.methods import METHODS, make_method
 from hfg.tuning.space import Cell
-from hfg.tuning.workers import Died, Workers
-from tests.limits import patience
 
 pytestmark = pytest.mark.slow
 
@@ -78,28 +74,6 @@ def test_a_search_that_was_cut_off_goes_on_to_the_same_result_and_journal(tmp_pa
         part.write_bytes(text[: len(text) * share // 10])  # as a process leaves it that is killed, mostly within a line
         assert told(search(journal=part)) == told(first)
         assert part.read_bytes() == text
-
-
-def test_a_process_leaves_the_garbage_of_its_parent_alone() -> None:
-    """As a Zenoh session that nobody closed: its finalizer waits for threads that a forked process does not have."""
-    here = os.getpid()
-
-    class Session:
-        def __init__(self) -> None:
-            self.me = self
-
-        def __del__(self) -> None:
-            if os.getpid() != here:
-                threading.Event().wait()
-
-    gc.disable()
-    try:
-        Session()
-        with Workers(lambda _: str(gc.collect()).encode(), processes=1, patience_s=patience(5)) as workers:
-            (found,) = workers.in_order([b""])
-    finally:
-        gc.enable()
-    assert not isinstance(found, Died)
 
 
 def test_crashes_and_errors_are_counted_and_kept_with_their_seed() -> None:
@@ -198,6 +172,27 @@ def test_a_sweep_has_a_row_for_each_combination() -> None:
 
 def test_means_have_the_interval_of_student() -> None:
     assert mean_of([1.0, 2.0, 3.0]).within == pytest.approx(4.303 / 3**0.5)
+
+
+def test_a_sweep_that_was_cut_off_goes_on_to_the_same_table_and_journal(tmp_path: Path) -> None:
+    def table(journal: Path) -> object:
+        told = sweep(
+            build, ["hill.x=0,1"], scores="score", seeds=[1, 2], faults=["hill.x=2@0", "hill.y=1@0"], journal=journal
+        )
+        return told.cells()
+
+    first, text = table(tmp_path / "whole"), (tmp_path / "whole").read_bytes()
+    for share in (0, 3, 7, 10):
+        (tmp_path / "part").write_bytes(text[: len(text) * share // 10])
+        assert table(tmp_path / "part") == first
+        assert (tmp_path / "part").read_bytes() == text
+
+
+def test_equal_runs_are_carried_out_once() -> None:
+    """The values before are the first member of a population, too, and a choice has few values."""
+    found = tune(build, ["hill.mode"], minimize="score", seeds=[1, 2], evaluations=9, processes=2)
+    assert len(found.evaluations) == 9
+    assert found.effort.runs == 4
 
 
 def test_failures_are_worse_than_any_score() -> None:

@@ -4,8 +4,8 @@
     python -m examples.fetch_delivery.machine.compare --minutes 0      what can be counted without a run
     python -m examples.fetch_delivery.machine.compare --page FILE      both, into the page docs/machine-or-activity.md
 
-Every mission runs in a process of its own, one after another, the two sorts in turn. Processor time is that of the
-whole process while the graph runs: arena, cameras and perception, which are the same for both, and mission control.
+Every mission runs in a process of its own, one after another. Processor time is that of the whole process: arena,
+cameras and perception, which are the same for both, and mission control.
 """
 
 from __future__ import annotations
@@ -14,27 +14,23 @@ import argparse
 import ast
 import inspect
 import io
-import json
 import re
-import statistics
-import subprocess
-import sys
-import time
 import tokenize
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Final, Literal, TypeAlias, get_args
+from typing import Final, Literal, TypeAlias
 
 import hfg
-from examples.fetch_delivery import laws
+from examples.fetch_delivery import judging, laws
 from examples.fetch_delivery.machine import driving as plain_driving
 from examples.fetch_delivery.machine import mission as machine_mission
 from examples.fetch_delivery.machine import robot as machine_robot
 from examples.fetch_delivery.mission import build, driving, errands, looking, robot, visiting
 from examples.fetch_delivery.perception import following, planning
 from hfg.graph.flat import ROOT, FlatEdge, flatten
+from hfg.tuning import Evaluation, Finished, mean_of, paired, sweep
 
 Sort: TypeAlias = Literal["activity", "machine"]
 KINDS: Final[dict[Sort, type[robot.Robot]]] = {"activity": robot.Robot, "machine": machine_robot.Robot}
@@ -160,40 +156,26 @@ def _kind(edge: FlatEdge) -> str:
 
 # --- missions ---
 
+SCORES: Final[dict[str, Callable[[Finished], float]]] = {
+    "cubes delivered": judging.delivered,
+    "delivered wrong": judging.wrong,
+    "contact, s": judging.contact_s,
+    "lamp on while driving, s": judging.lamp_while_driving_s,
+    "pictures a minute": judging.pictures_a_minute,
+    "firings a minute without perception": judging.firings_a_minute,
+    "processor time a minute, s": judging.processor_s_a_minute,
+}
 
-def mission(sort: Sort, seed: int, minutes: float) -> dict[str, Any]:
-    """Let one robot work by itself, and report its results and costs."""
-    graph = build(seed, kind=KINDS[sort])
-    began = time.process_time()
-    report = hfg.run(graph, clock="virtual", until_s=60 * minutes)
-    took = time.process_time() - began
-    world: Any = graph["world"]
-    (score,) = world.simulation.scores
+
+def missions(seeds: Sequence[int], minutes: float) -> dict[Sort, Evaluation]:
+    """Let one robot of each sort work by itself with each seed, one run after another."""
+    builds: dict[Sort, Callable[[], hfg.Graph]] = {"activity": judging.robot, "machine": judging.machine}
     return {
-        "sort": sort,
-        "seed": seed,
-        "minutes": minutes,
-        "delivered": len(score.delivered),
-        "wrong": len(score.wrong),
-        "contact_s": round(score.contact_s, 2),
-        "lamp_while_driving_s": round(score.lamp_while_driving_s, 2),
-        "pictures": world.pictures,
-        "firings": sum(one.firings for path, one in report.nodes.items() if "/perception/" not in path),
-        "cpu_s": took,
+        sort: sweep(build_one, scores=list(SCORES.values()), seeds=seeds, until_s=60 * minutes, processes=1)
+        .rows[0]
+        .evaluation
+        for sort, build_one in builds.items()
     }
-
-
-def missions(seeds: Sequence[int], minutes: float) -> list[dict[str, Any]]:
-    """Run all missions, each in a fresh process, the two sorts in turn."""
-    found = []
-    for seed in seeds:
-        for sort in get_args(Sort):
-            program = f"import json; from {__spec__.name} import mission; "
-            program += f"print(json.dumps(mission({sort!r}, {seed}, {minutes})))"
-            done = subprocess.run([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, check=True)
-            found.append(json.loads(done.stdout.splitlines()[-1]))
-            print(found[-1], file=sys.stderr)
-    return found
 
 
 # --- tables ---
@@ -210,32 +192,15 @@ def counted() -> str:
     return _table(("mission control", "activity flow graph", "state machine in a node"), rows)
 
 
-def measured(runs: Sequence[dict[str, Any]]) -> str:
-    """Return the table of missions: the median, and the least and most of all seeds."""
-    shown: dict[str, Callable[[dict[str, Any]], float]] = {
-        "cubes delivered": lambda run: run["delivered"],
-        "delivered wrong": lambda run: run["wrong"],
-        "contact, s": lambda run: run["contact_s"],
-        "lamp on while driving, s": lambda run: run["lamp_while_driving_s"],
-        "pictures a minute": lambda run: run["pictures"] / run["minutes"],
-        "firings a minute without perception": lambda run: run["firings"] / run["minutes"],
-        "processor time a minute, s": lambda run: run["cpu_s"] / run["minutes"],
-    }
+def measured(runs: Mapping[Sort, Evaluation], minutes: float) -> str:
+    """Return the table of missions: means, and the difference of runs with the same seed, with 95 % intervals."""
     rows = []
-    for name, value in shown.items():
-        cells = [_spread([value(run) for run in runs if run["sort"] == sort]) for sort in KINDS]
-        rows.append((name, *cells))
-    seeds = sorted({run["seed"] for run in runs})
-    head = f"one robot, {runs[0]['minutes']:g} simulated minutes, seeds {', '.join(map(str, seeds))}"
-    return _table((head, "activity flow graph", "state machine in a node"), rows)
-
-
-def _spread(values: Sequence[float]) -> str:
-    low, middle, high = (
-        f"{value:.3g}" if value < 1000 else f"{value:.0f}"
-        for value in (min(values), statistics.median(values), max(values))
-    )
-    return middle if low == high else f"{middle} ({low} to {high})"
+    for number, name in enumerate(SCORES):
+        activity, machine = (runs[sort].scores(number) for sort in KINDS)
+        rows.append((name, *map(str, (mean_of(activity), mean_of(machine), paired(activity, machine)))))
+    seeds = ", ".join(map(str, runs["activity"].runs))
+    head = f"one robot, {minutes:g} simulated minutes, seeds {seeds}"
+    return _table((head, "activity flow graph", "state machine in a node", "difference"), rows)
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -262,7 +227,7 @@ def main() -> None:
     given = arguments.parse_args()
     tables = {"counted": counted()}
     if given.minutes > 0:
-        tables["measured"] = measured(missions(given.seeds, given.minutes))
+        tables["measured"] = measured(missions(given.seeds, given.minutes), given.minutes)
     if given.page is None:
         print("\n\n".join(tables.values()))
         return

@@ -16,8 +16,7 @@ from examples.fetch_delivery.perception.planning import RADIUS, Path
 from examples.fetch_delivery.perception.records import Localised, wrapped
 from hfg.nodes.robotics import Disk, scan_points
 
-_FORESIGHT: Final = 0.35  # seconds: how far ahead on the path the robot aims, beside _LEAST_AHEAD
-_LEAST_AHEAD: Final = 0.15
+_LEAST_AHEAD: Final = 0.15  # metres on the path that the robot aims ahead at least
 _REACTION: Final = 0.2  # seconds from a scan to wheels that obey
 _LOOK: Final = 1.0  # metres before the goal, from where on the robot turns to its heading
 
@@ -34,6 +33,7 @@ class Limits:
       robot: the gap that is kept from other robots.
       near: how near to the goal is there, in metres.
       aligned: and how near to its heading, in radians.
+      foresight: how far ahead on the path the robot aims, in seconds of its way.
     """
 
     speed: float = 0.6
@@ -43,6 +43,7 @@ class Limits:
     robot: float = 0.1
     near: float = 0.04
     aligned: float = 0.04
+    foresight: float = 0.35
 
 
 LIMITS: Final = Limits()
@@ -59,7 +60,7 @@ def follow(path: Path, localised: Localised, scan: Scan, speed: float = 0.0, lim
       limits: how fast it may be, and how near to what.
     """
     pose = localised.pose
-    remaining, aim = _ahead(path.points, pose[:2], _LEAST_AHEAD + _FORESIGHT * speed)
+    remaining, aim = _ahead(path.points, pose[:2], _LEAST_AHEAD + limits.foresight * speed)
     turn = float(wrapped(path.heading - pose[2]))
     if remaining < limits.near and abs(turn) < limits.aligned:
         return None
@@ -130,6 +131,7 @@ class FollowPath(hfg.Node):
 
     Attributes:
       speed: top speed.
+      foresight: how far ahead on the path it aims, in seconds of its way.
       near: how near to the goal is there.
       aligned: and how near to its heading.
       patience: so long may the robot come no nearer to the goal before `blocked` tells.
@@ -144,6 +146,7 @@ class FollowPath(hfg.Node):
     """
 
     speed = hfg.Parameter(0.6, unit="m/s")
+    foresight = hfg.Parameter(0.35, unit="s")
     near = hfg.Parameter(0.04, unit="m")
     aligned = hfg.Parameter(0.04, unit="rad")
     patience = hfg.Parameter(3.0, unit="s")
@@ -166,7 +169,7 @@ class FollowPath(hfg.Node):
             stopping, self.last = self.last is not None, None
             return Twist() if stopping else None
         speed = math.hypot(self.last.vx, self.last.vy) if self.last is not None else 0.0
-        limits = Limits(speed=self.speed, near=self.near, aligned=self.aligned)
+        limits = Limits(speed=self.speed, near=self.near, aligned=self.aligned, foresight=self.foresight)
         twist = follow(self.way, localised, scan, speed, limits)
         waited = self._has_waited(scan.stamp, twist is None)
         if twist is None and not self.way.waits:
