@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Final, TypeAlias, TypeVar
 
 from hfg.errors import DeclarationError, UsageError
-from hfg.nodetypes.description import EventSpec, InputSpec, NodeType, OutputSpec, SlotSpec
+from hfg.nodetypes.description import EventSpec, InputSpec, NodeType, OutputSpec, Result, SlotSpec
 from hfg.nodetypes.hints import MISSING, hints_of, kind_of, split_token
 from hfg.nodetypes.signature import Signature, read_signature
 from hfg.nodetypes.vectors import list_of, size_parameters, vector_specs
@@ -91,11 +91,8 @@ def _described(cls: type[Any], base: type[Any], where: str) -> NodeType:
         inputs = {spec.name: spec for spec in signature.inputs}
         parameters.update((spec.name, spec) for spec in signature.parameters if spec.name not in parameters)
         outputs = outputs or _outputs(signature, where, must_say=not _has_inputs(declared))
-    triggers = [spec for spec in parameters.values() if spec.trigger]
-    events = {name: EventSpec(name, d.type) for name, d in _declared_as(declared, Event, Events)}
-    events.update((spec.name, EventSpec(spec.name, spec.type)) for spec in triggers)
     slots = {name: _slot_spec(cls, d, where, is_subgraph) for name, d in _declared_as(declared, Slot, Slots)}
-    slots.update((spec.name, SlotSpec(spec.name, spec.type or object)) for spec in triggers)
+    events, slots = _signals(declared, slots, parameters)
     return NodeType(
         name=snake_case(cls.__name__),
         origin=cls,
@@ -109,7 +106,7 @@ def _described(cls: type[Any], base: type[Any], where: str) -> NodeType:
         parameters=parameters,
         states=_of(declared, State),
         process_kind="none" if signature is None else signature.kind,
-        result="none" if not outputs else "single" if len(outputs) == 1 else "fields",
+        result=_result(outputs),
         is_subgraph=is_subgraph,
         shared=shared_names(inputs, outputs, events, slots),
         declared=declared,
@@ -118,6 +115,22 @@ def _described(cls: type[Any], base: type[Any], where: str) -> NodeType:
         caller=None if signature is None else _caller(signature),
         vectors=vectors,
     )
+
+
+def _signals(
+    declared: Mapping[str, Declaration], slots: Mapping[str, SlotSpec], parameters: Mapping[str, ParameterSpec]
+) -> tuple[dict[str, EventSpec], dict[str, SlotSpec]]:
+    """Return the events and slots; a trigger parameter has one of each."""
+    triggers = [spec for spec in parameters.values() if spec.trigger]
+    events = {name: EventSpec(name, d.type) for name, d in _declared_as(declared, Event, Events)}
+    events.update((spec.name, EventSpec(spec.name, spec.type)) for spec in triggers)
+    return events, {**slots, **{spec.name: SlotSpec(spec.name, spec.type or object) for spec in triggers}}
+
+
+def _result(outputs: Mapping[str, OutputSpec]) -> Result:
+    if not outputs:
+        return "none"
+    return "single" if len(outputs) == 1 else "fields"
 
 
 def _has_process(cls: type[Any], base: type[Any], where: str, is_subgraph: bool) -> bool:

@@ -101,19 +101,28 @@ def _short(value: Any, depth: int) -> str:
         return str(value)
     digits = 4 if depth == 0 else 3
     if isinstance(value, np.ndarray) and value.dtype.kind in "iuf":
-        few = value.size <= _MOST_FIELDS
-        return f"({', '.join(f'{one:.{digits}g}' for one in value.flat)})" if few else f"{value.size} numbers"
+        return _short_array(value, digits)
     if isinstance(value, float | np.floating):
         return f"{value:.{digits}g}"
     if isinstance(value, str) and depth == 0:
         return " ".join(value.split())
-    fields = fields_of(value)
-    if fields and depth < _DEEPEST:
-        parts = [f"{name} {_short(one, depth + 1)}" for name, one in list(fields.items())[:_MOST_FIELDS]]
-        return ", ".join(parts) + (", …" if len(fields) > _MOST_FIELDS else "")
+    fields = fields_of(value) if depth < _DEEPEST else None
+    if fields:
+        return _short_record(fields, depth)
     if isinstance(value, list | tuple) and value and fields_of(value[0]):
         return f"{len(value)} x {type(value[0]).__name__}"
     return text(value)
+
+
+def _short_array(value: np.ndarray[Any, Any], digits: int) -> str:
+    if value.size > _MOST_FIELDS:
+        return f"{value.size} numbers"
+    return f"({', '.join(f'{one:.{digits}g}' for one in value.flat)})"
+
+
+def _short_record(fields: Mapping[str, Any], depth: int) -> str:
+    parts = [f"{name} {_short(one, depth + 1)}" for name, one in list(fields.items())[:_MOST_FIELDS]]
+    return ", ".join(parts) + (", …" if len(fields) > _MOST_FIELDS else "")
 
 
 def fields_of(value: Any) -> dict[str, Any] | None:

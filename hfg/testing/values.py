@@ -182,6 +182,23 @@ def _of(hint: Any, limits: tuple[Any, ...], alike: Alike | None) -> st.SearchStr
     if hint is None or hint is type(None):
         return st.none()
     origin, arguments = typing.get_origin(hint) or hint, typing.get_args(hint)
+    if not isinstance(origin, type) or origin in (types.UnionType, abc.Callable):
+        return _of_form(hint, origin, arguments, limits, alike)
+    scalar = _scalar(origin, limits)
+    if scalar is not None:
+        return scalar
+    container = _container(origin, arguments, limits, alike)
+    if container is not None:
+        return container
+    if typing.is_typeddict(origin) or names_of(origin) is not None:
+        return _record(origin, alike)
+    return st.from_type(hint)
+
+
+def _of_form(
+    hint: Any, origin: Any, arguments: tuple[Any, ...], limits: tuple[Any, ...], alike: Alike | None
+) -> st.SearchStrategy[Any]:
+    """Return a strategy for a type hint that is not a class."""
     if origin is Literal:
         return st.sampled_from(arguments)
     if origin in (typing.Union, types.UnionType):
@@ -191,16 +208,6 @@ def _of(hint: Any, limits: tuple[Any, ...], alike: Alike | None) -> st.SearchStr
     if origin is abc.Callable:
         result = _values(callable_parts(hint)[1], (), alike)
         return result.map(lambda value: lambda *values, **named: value)
-    if not isinstance(origin, type):
-        return st.from_type(hint)
-    scalar = _scalar(origin, limits)
-    if scalar is not None:
-        return scalar
-    container = _container(origin, arguments, limits, alike)
-    if container is not None:
-        return container
-    if typing.is_typeddict(origin) or names_of(origin) is not None:
-        return _record(origin, alike)
     return st.from_type(hint)
 
 
