@@ -37,7 +37,7 @@ help:
 
 # On a slow machine it ends earlier, and reports what there is by then.
 demo: $(READY)
-	$(BIN)/python -m examples.fetch_delivery --minutes 2 --within 120 --report out/fetch_delivery
+	$(BIN)/python -m examples.fetch_delivery --minutes 2 --within 120 --report out/fetch_delivery $(ARGS)
 
 # In real time, until Ctrl-C. Without a browser it prints the address.
 studio: $(READY)

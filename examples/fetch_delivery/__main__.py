@@ -13,9 +13,10 @@ import hfg
 from examples.fetch_delivery.mission import Robot, build
 from examples.fetch_delivery.running import carry_out
 from examples.fetch_delivery.showing import Showing
-from examples.fetch_delivery.world import FAULTS, Cameras, Fault, fault
+from examples.fetch_delivery.world import FAULTS, LIMITS, USUAL, Cameras, Fault, Surroundings, fault
 
 SHOWN_IN = Path("out", "fetch_delivery")
+_MEASURES = ", ".join(f"{name} ({getattr(USUAL, name):g})" for name in LIMITS)
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 
@@ -24,6 +25,23 @@ def _known_faults(names: list[str] | None) -> list[str]:
         if name not in FAULTS:
             raise typer.BadParameter(f"there is no fault {name!r}; there are {', '.join(FAULTS)}")
     return names or []
+
+
+def _surroundings(settings: list[str]) -> Surroundings:
+    values = {}
+    for setting in settings:
+        name, _, value = setting.partition("=")
+        if name not in LIMITS:
+            raise typer.BadParameter(f"an arena has no {name!r}; it has {', '.join(LIMITS)}", param_hint="'--param'")
+        try:
+            values[name] = float(value)
+        except ValueError:
+            problem = f"write a number behind {name}, such as {name}={getattr(USUAL, name):g}, not {setting!r}"
+            raise typer.BadParameter(problem, param_hint="'--param'") from None
+    try:
+        return Surroundings(**values)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="'--param'") from None
 
 
 def _kind(machine: bool) -> type[Robot]:
@@ -59,6 +77,14 @@ def main(
             "--fault", metavar="NAME", help=f"Goes wrong after 30 s: {', '.join(FAULTS)}.", callback=_known_faults
         ),
     ] = None,
+    params: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--param",
+            metavar="NAME=VALUE",
+            help=f"Makes the arena other than usual: {_MEASURES}.",
+        ),
+    ] = None,
     within: Annotated[
         float | None, typer.Option(metavar="SECONDS", min=1, help="End it earlier when it takes longer than that.")
     ] = None,
@@ -86,7 +112,8 @@ def main(
     faults: tuple[Fault, ...] = tuple(fault(name) for name in fault_names or [])
     if cut and (record is not None or report is not None or show):
         raise typer.BadParameter("a run in several processes cannot be recorded or shown; leave --cut or that out")
-    graph = build(seed, robots, faults=faults, cut=cut, kind=_kind(machine), cameras=cameras)
+    surroundings = _surroundings(params or [])
+    graph = build(seed, robots, faults=faults, cut=cut, kind=_kind(machine), cameras=cameras, surroundings=surroundings)
     showing = None
     if report is not None or show:
         showing = _showing(report or SHOWN_IN, graph, seed, robots, 60 * minutes)

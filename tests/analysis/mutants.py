@@ -73,7 +73,7 @@ MUTANTS: dict[str, Change] = {
     "no way for a view to give up": missing(f"{ROBOT}/explore/view.gave_up", f"{ROBOT}/explore.gave_up.inner"),
     "no gate of dock": ungated(f"{VISIT}/dock"),
     "no gate of leave": ungated(f"{VISIT}/leave"),
-    "no gate of the way": ungated(f"{VISIT}/go_to"),
+    "no gate of position": ungated(f"{VISIT}/position"),
 }
 
 

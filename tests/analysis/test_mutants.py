@@ -71,5 +71,5 @@ def test_nearly_all_counter_examples_with_explicit_modifiers_happen_and_the_othe
 
 def test_what_is_proved_cannot_be_replayed() -> None:
     graph = build()
-    with pytest.raises(UsageError, match="no counter-example was found: at most one of 43 nodes"):
+    with pytest.raises(UsageError, match="no counter-example was found: at most one of 47 nodes"):
         replay_activity(graph, hfg.analyse_activity(graph).at_most_one("robot_0"))

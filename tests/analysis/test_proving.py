@@ -257,7 +257,7 @@ def test_exactly_one_state_of_the_delivery_mission_is_active(robots: int) -> Non
     report = hfg.analyse_activity(build(robots=robots))
     assert len(report.regions) == robots
     for number, region in enumerate(report.regions):
-        assert len(region.nodes) == 43
+        assert len(region.nodes) == 47
         assert region.exactly_one.holds
         assert report.exactly_one(f"robot_{number}").holds
     assert not report.problems

@@ -100,7 +100,7 @@ def lines(sort: Sort) -> dict[str, int]:
         order, wiring = code_lines(machine_mission), code_lines(machine_robot)
         return {"how it drives": drives, "what it does when, and wiring": order + wiring}
     drives = code_lines(laws) + code_lines(driving, only=_LAWS) + code_lines(planning, only=["PlanPath"])
-    drives += code_lines(following, only=["FollowPath"])
+    drives += code_lines(following, only=["FollowPath", "Queue"])
     order = code_lines(driving, without=_LAWS) + code_lines(looking) + code_lines(visiting) + code_lines(errands)
     order += code_lines(robot, only=["Robot", "NumberWhen"])
     return {"how it drives": drives, "what it does when, and wiring": order}

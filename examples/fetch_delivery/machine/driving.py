@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias
 from examples.fetch_delivery import laws
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
 from examples.fetch_delivery.perception.following import Limits, follow
-from examples.fetch_delivery.perception.laser import wall_ahead
+from examples.fetch_delivery.perception.laser import smooth_scan, wall_ahead
 from examples.fetch_delivery.perception.planning import Path, length_of, plan, queue
 from examples.fetch_delivery.perception.records import Localised, Sighting, Station, wrapped
 from hfg.nodes.robotics import Disk
@@ -71,6 +71,7 @@ class GoTo:
     without_path: float = 8.0
     patience: float = 6.0
     path: Path | None = None
+    waits: bool = False
     poses: int = 0
     since: float | None = None
     queues_since: float | None = None
@@ -92,21 +93,21 @@ class GoTo:
             return Twist(), "blocked" if waited >= self.without_path else None
         limits = Limits(near=self.near, aligned=self.aligned)
         twist = follow(self.path, localised, scan, math.hypot(self.last.vx, self.last.vy), limits)
-        if twist is None and self.path.waits:
+        if twist is None and self.waits:
             return self._queue(scan.stamp)
         if twist is None:
             return Twist(), "done"
         self.last = twist
-        if not self.path.waits:
+        if not self.waits:
             self.queues_since = None
         return twist, "blocked" if waited > self.patience else None
 
     def _plan(self, localised: Localised, others: Sequence[Disk]) -> None:
-        waiting = queue(localised.pose, self.goal, others, self.lane) if self.lane else None
+        waiting = queue(localised.shape, localised.pose, self.goal, others, self.lane) if self.lane else None
         if waiting is not None:
-            path = Path(*waiting, waits=True)
+            path = Path(*waiting)
         else:
-            points = plan(localised.pose, self.goal, others, beside=not self.lane)
+            points = plan(localised.shape, localised.pose, self.goal, others, beside=not self.lane)
             if points is None:
                 return
             path = Path(points, float(self.goal[2]))
@@ -114,7 +115,7 @@ class GoTo:
         left = length_of(path.points) + 0.3 * abs(float(wrapped(path.heading - localised.pose[2])))
         if elsewhere or left < self.least - 0.05:
             self.least, self.since = left, localised.stamp
-        self.path = path
+        self.path, self.waits = path, waiting is not None
 
     def _queue(self, now: float) -> Step:
         self.last, self.since = Twist(), now
@@ -168,12 +169,12 @@ class Dock:
       speed: at most.
     """
 
-    distance: float = 0.36
+    distance: float = 0.32
     speed: float = 0.3
 
     def step(self, scan: Scan) -> Step:
         """Look ahead."""
-        return _ended(laws.approach(scan, self.distance, self.speed))
+        return _ended(laws.approach(smooth_scan.function(scan), self.distance, self.speed))
 
 
 def _ended(twist: Twist | None) -> Step:

@@ -19,7 +19,6 @@ from transitions.extensions.nesting import NestedState
 
 from examples.fetch_delivery.machine.driving import Dock, GoTo, Move, Position, Step
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
-from examples.fetch_delivery.perception import shape
 from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, Station, wrapped
 from examples.fetch_delivery.perception.signs import delivery_station
 from hfg.nodes.robotics import Disk
@@ -110,6 +109,8 @@ _VISIT: Final[dict[str, Any]] = {
     ],
 }
 
+_CONFIRM: Final[dict[str, Any]] = {"name": "confirm", "on_enter": "ask_for_basket"}
+
 STATES: Final[list[Any]] = [
     "wait_for_start",
     {"name": "advance", "on_enter": "begin_to_advance"},
@@ -129,7 +130,7 @@ STATES: Final[list[Any]] = [
             {"name": "go_to", "on_enter": "begin_to_go_to_view"},
         ],
     },
-    {"name": "deliver", "initial": "visit", "on_enter": "begin_to_deliver", "children": [_VISIT]},
+    {"name": "deliver", "initial": "visit", "on_enter": "begin_to_deliver", "children": [_VISIT, _CONFIRM]},
 ]
 
 
@@ -156,19 +157,21 @@ TRANSITIONS: Final[list[Any]] = [
     {"trigger": "failed", "source": "explore/view", "dest": "fetch", "before": "give_the_cube_back"},
     ["done", ["explore/go_to", "explore/look_around"], "read_cube"],
     {"trigger": "failed", "source": "deliver/visit", "dest": "deliver/visit", "conditions": "may_try_again"},
+    ["failed", "deliver/visit", "deliver/confirm"],
     {
-        "trigger": "failed",
-        "source": "deliver/visit",
+        "trigger": "read",
+        "source": "deliver/confirm",
         "dest": "read_cube",
         "conditions": "may_bring_again",
         "before": "forget_sign",
     },
     {
-        "trigger": "failed",
-        "source": "deliver/visit",
+        "trigger": "read",
+        "source": "deliver/confirm",
         "dest": "fetch",
         "before": ["forget_sign", "give_the_cube_back"],
     },
+    ["lost", "deliver/confirm", "fetch"],
     ["served", "deliver/visit", "fetch"],
     *_visit("fetch/visit"),
     *_visit("deliver/visit"),
@@ -187,6 +190,7 @@ LIMITS: Final[dict[str, tuple[float, str]]] = {
     "leave": (6.0, "served"),
     "retreat": (6.0, "failed"),
     "read_cube": (10.0, "lost"),
+    "confirm": (4.0, "lost"),
     "view": (5.0, "lost"),
     "explore/go_to": (15.0, "done"),
 }
@@ -233,6 +237,7 @@ class Mission:
             "leave": self._leave,
             "retreat": self._retreat,
             "read_cube": self._read_cube,
+            "confirm": self._read_cube,
             "view": self._choose_view,
         }
         self.machine = _Machine(
@@ -279,7 +284,7 @@ class Mission:
         localised = self.senses.localised
         if localised is None or not localised.sure:
             return None
-        stations = self.senses.filling or [_side(number) for number in range(8)]
+        stations = self.senses.filling or [Station.side(localised.shape, number) for number in range(8)]
         self.station = min(stations, key=lambda station: self._cost(station, localised))
         return "chosen"
 
@@ -455,11 +460,6 @@ class Mission:
 
 def _nothing() -> None:
     return None
-
-
-def _side(number: int) -> Station:
-    theta = float(wrapped(number * shape.TURN))
-    return Station(shape.OCTAGON_APOTHEM * math.cos(theta), shape.OCTAGON_APOTHEM * math.sin(theta), theta)
 
 
 def _key(station: Station) -> tuple[int, int]:

@@ -13,9 +13,9 @@ from hfg import monitors as m
 __all__ = ["conditions", "demands", "steps"]
 
 LONGEST_ERRAND_S = 300.0
-LONGEST_S = {"go_to/plan": 8.2, "go_to/follow": 60.2, "position": 20.2, "dock": 10.2, "wait": 20.2, "leave": 6.2}
+LONGEST_S = {"go_to/plan": 8.2, "go_to/follow": 60.2, "go_to/queue": 60.2, "position": 20.2, "dock": 10.2, "wait": 20.2}
 LONGEST_S |= {"select": 5.2, "view": 5.2, "turn": 15.2, "retreat": 6.2, "settle": 0.7, "advance": 10.2}
-LONGEST_S |= {"read_cube": 10.2}
+LONGEST_S |= {"leave": 6.2, "read_cube": 10.2, "confirm": 4.2}
 """How long each step may hold the activity: its time-out where it has one, else the moment it takes."""
 
 STANDING = ("settle", "lamp_on/once/gate", "lamp_on/once/export", "wait", "lamp_off/once/gate", "dark/once/gate")

@@ -15,7 +15,7 @@ import hfg
 from examples.fetch_delivery import laws
 from examples.fetch_delivery.messages import Odometry, Scan, Twist, Vector
 from examples.fetch_delivery.mission.looking import Shutter
-from examples.fetch_delivery.perception.following import FollowPath
+from examples.fetch_delivery.perception.following import FollowPath, Queue
 from examples.fetch_delivery.perception.planning import PlanPath
 from examples.fetch_delivery.perception.records import Localised, Sighting, Station, Wall
 from hfg.nodes.robotics import Disk
@@ -141,7 +141,7 @@ class MoveToObstacle(hfg.Node):
       done: it is there, and stops.
     """
 
-    distance = hfg.Parameter(0.36, Gt(0), unit="m")
+    distance = hfg.Parameter(0.32, Gt(0), unit="m")
     speed = hfg.Parameter(0.3, Gt(0), unit="m/s")
     scan = hfg.Input(Scan)
     command = hfg.Output(Twist)
@@ -163,7 +163,8 @@ class GoTo(hfg.Subgraph):
     """Go to a pose of the map: plan a path around what stands about, and follow it.
 
     The activity comes with the goal to the planner, goes with the first path to the follower, and leaves when that has
-    arrived or has come no nearer for long, or when there is no path for long. While it drives it looks about.
+    arrived or has come no nearer for long, or when there is no path for long. While another robot has taken the goal,
+    the activity is with the queue. While it drives it looks about.
 
     Attributes:
       localised: where the robot is.
@@ -192,27 +193,33 @@ class GoTo(hfg.Subgraph):
     queueing = hfg.Parameter(60.0)
 
     def build(self, graph: hfg.Graph) -> None:
-        """Put the planner before the follower."""
+        """Connect the planner to the follower and to the queue."""
         plan = graph.add(PlanPath(), name="plan", active_for_s=8.1)
         follow = graph.add(FollowPath(patience=6.0), name="follow")
-        shutter = graph.add(Shutter(n=3), name="shutter")
+        queue, shutter = graph.add(Queue(), name="queue"), graph.add(Shutter(n=3), name="shutter")
         self.go.inner.activates(plan.goal)
-        plan.path.activates(follow.ports.slots["path"])
+        for free, taken in ((plan.path, plan.aside), (queue.free, follow.taken)):
+            free.activates(follow.ports.slots["path"])
+            taken.activates(queue.ports.slots["aside"])
+        graph.connect(plan.path, queue.ports.slots["path"])
+        graph.connect(plan.aside, follow.ports.slots["aside"], overflow="latest")
         follow.arrived.activates(self.arrived.inner)
-        follow.blocked.activates(self.blocked.inner)
-        plan.timeout.activates(self.blocked.inner)
-        for node in (plan, follow):
+        for end in (follow.blocked, queue.blocked, plan.timeout):
+            end.activates(self.blocked.inner)
+        for node in (plan, follow, queue):
             graph.connect(self.stop.inner, node.stop)
             graph.connect(self.localised.inner, node.localised)
         graph.connect(self.others.inner, plan.others)
-        graph.connect(self.scan.inner, follow.scan)
-        graph.connect(follow.command, self.command.inner)
+        for drives in (follow, queue):
+            graph.connect(self.scan.inner, drives.scan)
+            graph.connect(drives.command, self.command.inner)
+            graph.gate(drives, by=drives)
         graph.connect(self.localised.inner, shutter.tick)
         graph.connect(shutter.look, self.look.inner)
         graph.promote(self.near, follow.ports.parameters["near"])
         graph.promote(self.aligned, follow.ports.parameters["aligned"])
         graph.promote(self.lane, plan.ports.parameters["lane"])
-        graph.promote(self.queueing, follow.ports.parameters["queueing"])
+        graph.promote(self.queueing, queue.ports.parameters["patience"])
 
 
 class LookAround(hfg.Subgraph):

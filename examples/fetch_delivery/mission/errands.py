@@ -14,8 +14,8 @@ from annotated_types import Ge, Gt
 import hfg
 from examples.fetch_delivery.messages import Odometry, Scan, Twist, Vector
 from examples.fetch_delivery.mission.driving import GoTo, LookAround
+from examples.fetch_delivery.mission.looking import Shutter
 from examples.fetch_delivery.mission.visiting import AtStation, Visit
-from examples.fetch_delivery.perception import shape
 from examples.fetch_delivery.perception.records import Localised, Sign, Station, wrapped
 from examples.fetch_delivery.perception.signs import delivery_station
 from hfg.nodes import activity
@@ -49,7 +49,7 @@ class SelectFilling(hfg.Node):
         """Choose, once the robot knows where it is."""
         if not localised.sure:
             return
-        stations = self.known or [_side(number) for number in range(8)]
+        stations = self.known or [Station.side(localised.shape, number) for number in range(8)]
         self.chosen = min(stations, key=lambda station: self._cost(station, localised, others))
         self.station.trigger(self.chosen)
 
@@ -74,11 +74,6 @@ class SelectFilling(hfg.Node):
     def again(self) -> None:
         """Remember where it failed."""
         self.failures[_key(self.chosen)] = hfg.now()
-
-
-def _side(number: int) -> Station:
-    theta = float(wrapped(number * shape.TURN))
-    return Station(shape.OCTAGON_APOTHEM * math.cos(theta), shape.OCTAGON_APOTHEM * math.sin(theta), theta)
 
 
 def _key(station: Station) -> tuple[int, int]:
@@ -137,9 +132,11 @@ class Destination(hfg.Node):
 class DeliverCube(AtStation):
     """Bring the cube to the station whose sign is where the map has it; try that more than once.
 
+    When it gives up it looks into the basket first: perhaps the cube was taken at the last moment.
+
     Attributes:
       begin: where the sign is; where activity arrives.
-      gave_up: the cube could not be delivered.
+      gave_up: the cube could not be delivered, and lies in the basket still.
     """
 
     begin = hfg.slot(type=Sign)
@@ -158,8 +155,19 @@ class DeliverCube(AtStation):
         visit.done.activates(tries.done)
         visit.gave_up.activates(tries.gave_up)
         tries.finished.activates(self.done.inner)
-        tries.exhausted.activates(self.gave_up.inner)
         relay(graph, self, visit)
+
+        confirm = graph.add(activity.WaitForMessage(), name="confirm", active_for_s=4.1)
+        shutter = graph.add(Shutter(n=2), name="shutter")
+        tries.exhausted.activates(confirm.begin)
+        confirm.received.activates(self.gave_up.inner)
+        confirm.timeout.activates(self.done.inner)
+        graph.connect(confirm.activated, self.ask.inner)
+        graph.connect(self.number.inner, confirm.message)
+        graph.connect(self.scan.inner, shutter.tick)
+        graph.connect(shutter.look, self.look_into_basket.inner)
+        for looks in (confirm, shutter):
+            graph.gate(looks, by=confirm)
 
 
 def relay(graph: hfg.Graph, outer: AtStation, visit: Visit) -> None:

@@ -12,6 +12,7 @@ counts how often a cube was brought in vain: an unwanted cube is reported and ex
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 
 import hfg
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
@@ -27,7 +28,7 @@ from examples.fetch_delivery.perception.records import Localised, Sighting, Sign
 from examples.fetch_delivery.perception.sighting import find_targets, read_digits
 from examples.fetch_delivery.perception.signs import SignMap
 from examples.fetch_delivery.perception.stations import StationMap
-from examples.fetch_delivery.world import Cameras, Fault
+from examples.fetch_delivery.world import USUAL, Cameras, Fault, Surroundings
 from hfg.images import Gray
 from hfg.nodes import activity, flow
 from hfg.nodes.robotics import Disk
@@ -254,6 +255,7 @@ def build(
     cut: bool = False,
     kind: type[Robot] = Robot,
     cameras: Cameras = "light",
+    surroundings: Surroundings = USUAL,
 ) -> hfg.Graph:
     """Build the arena with robots in it, each with a mission of its own.
 
@@ -267,13 +269,14 @@ def build(
         processes do not share, they are cut as well, but run on one loop.
       kind: what sort of robot; all have the same ports.
       cameras: what draws the pictures: the light renderer, or MuJoCo, which needs a package and OpenGL.
+      surroundings: how large the arena is, and how badly is measured in it.
     """
     graph = hfg.Graph("fetch-delivery")
     if cut:
         for group in ("perception", "control"):
             graph.group(group, process=True)
     world = graph.add(
-        World(seed=seed, speed=speed, faults=faults, cameras=cameras, odometry=robots),
+        World(seed=seed, speed=speed, faults=faults, cameras=cameras, odometry=robots, **asdict(surroundings)),
         name="world",
         max_rate_hz=RATE_HZ,
     )

@@ -14,7 +14,7 @@ import hfg
 from examples.fetch_delivery.messages import Odometry, Scan, Twist, Vector
 from examples.fetch_delivery.mission.driving import GoTo, MoveRobot, MoveToObstacle, PositionToTarget
 from examples.fetch_delivery.mission.looking import Shutter
-from examples.fetch_delivery.perception.laser import wall_ahead
+from examples.fetch_delivery.perception.laser import smooth_scan, wall_ahead
 from examples.fetch_delivery.perception.records import Localised, Sighting, Station
 from hfg.nodes import activity
 from hfg.nodes.robotics import Disk
@@ -224,7 +224,7 @@ class Visit(AtStation):
 
     def _feed(self, graph: hfg.Graph) -> None:
         """Send each step the data it needs, and let those that are not active rest."""
-        wall = graph.add(wall_ahead(), name="wall")
+        wall, smooth = graph.add(wall_ahead(), name="wall"), graph.add(smooth_scan(), name="smooth")
         shutter, basket = graph.add(Shutter(n=2), name="shutter"), graph.add(Shutter(n=4), name="basket")
         go_to, position, dock = graph["go_to"], graph["position"], graph["dock"]
         for drives in ("go_to", "position", "dock", "leave", "retreat"):
@@ -238,13 +238,14 @@ class Visit(AtStation):
         graph.connect(self.scan.inner, wall.scan)
         graph.connect(self.localised.inner, position.ports.inputs["localised"])
         graph.connect(wall.out, position.ports.inputs["wall"])
-        graph.connect(self.scan.inner, dock.ports.inputs["scan"])
+        graph.connect(self.scan.inner, smooth.scan)
+        graph.connect(smooth.out, dock.ports.inputs["scan"])
         graph.connect(self.targets.inner, position.ports.slots["see"])
         graph.connect(self.localised.inner, shutter.tick)
         graph.connect(shutter.look, self.look.inner)
         graph.connect(self.scan.inner, basket.tick)
         graph.connect(basket.look, self.look_into_basket.inner)
-        for gated, state in ((wall, "position"), (shutter, "position"), (basket, "wait")):
+        for gated, state in ((wall, "position"), (shutter, "position"), (smooth, "dock"), (basket, "wait")):
             graph.gate(gated, by=graph[state])
         for lamp in ("lamp_on", "lamp_off", "dark"):
             graph.connect(self.scan.inner, graph[lamp].ports.inputs["tick"])

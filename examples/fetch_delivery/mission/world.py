@@ -8,7 +8,7 @@ from annotated_types import Ge, Interval
 
 import hfg
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
-from examples.fetch_delivery.world import Cameras, Fault, Simulation
+from examples.fetch_delivery.world import LIMITS, USUAL, Cameras, Fault, Simulation, Surroundings
 from examples.fetch_delivery.world.robots import Limits
 from hfg.images import Gray
 from hfg.panels import Call, Change, Look, Scene, view
@@ -38,6 +38,12 @@ class Push(NamedTuple):
     turn: Annotated[float, Interval(ge=-3.2, le=3.2), hfg.Parameter(unit="rad")] = 0.4
 
 
+def _within(name: str) -> Interval:
+    """Return the bounds of a measure of the arena."""
+    least, most = LIMITS[name]
+    return Interval(ge=least, le=most)
+
+
 class World(hfg.Node):
     """The simulated arena with its robots.
 
@@ -48,6 +54,13 @@ class World(hfg.Node):
       seed: decides what looks like chance.
       speed: of the motors, at most.
       light: how bright it is, 1 as usual.
+      radius: of the outer wall, to its corners.
+      octagon: from its middle to each side.
+      drift: of the wheels, in times of the usual one.
+      noise: of the laser, as standard deviation.
+      offset: by how much the laser measures too far.
+      blur: how long the cameras expose, in times of the usual time.
+      reach: how far from a sign people reach a basket.
       blocked: the station before which a crate stands.
       faults: what should go wrong.
       cameras: what draws the pictures.
@@ -66,7 +79,14 @@ class World(hfg.Node):
 
     seed = hfg.Parameter(1, Ge(0))
     speed = hfg.Parameter(0.6, Interval(gt=0, le=3), unit="m/s")
-    light = hfg.Parameter(1.0, Interval(ge=0, le=1))
+    light = hfg.Parameter(USUAL.light, _within("light"))
+    radius = hfg.Parameter(USUAL.radius, _within("radius"), unit="m")
+    octagon = hfg.Parameter(USUAL.octagon, _within("octagon"), unit="m")
+    drift = hfg.Parameter(USUAL.drift, _within("drift"))
+    noise = hfg.Parameter(USUAL.noise, _within("noise"), unit="m")
+    offset = hfg.Parameter(USUAL.offset, _within("offset"), unit="m")
+    blur = hfg.Parameter(USUAL.blur, _within("blur"))
+    reach = hfg.Parameter(USUAL.reach, _within("reach"), unit="m")
     blocked = hfg.Parameter[Blocked]("none", choices=get_args(Blocked))
     faults = hfg.Parameter[tuple[Fault, ...]](())
     cameras = hfg.Parameter[Cameras]("light")
@@ -88,7 +108,12 @@ class World(hfg.Node):
         """Build the arena anew."""
         limits = Limits(speed=self.speed)
         self.simulation = Simulation(
-            self.seed, robots=len(self.odometry), limits=limits, faults=self.faults, cameras=self.cameras
+            self.seed,
+            robots=len(self.odometry),
+            limits=limits,
+            faults=self.faults,
+            cameras=self.cameras,
+            surroundings=Surroundings(**{name: getattr(self, name) for name in LIMITS}),
         )
 
     def process(self) -> None:

@@ -93,6 +93,7 @@ class CubeWatch(hfg.Node):
 
     Attributes:
       times: so often in a row it has to be seen.
+      doubtful: and so often a cube without a code: an operator sets right what lies askew.
       image: of the basket camera.
       cube: what this picture shows, right or wrong.
       number: a cube of this station lies in the basket.
@@ -106,6 +107,7 @@ class CubeWatch(hfg.Node):
     """
 
     times = hfg.Parameter(2, Interval(ge=1, le=100))
+    doubtful = hfg.Parameter(12, Interval(ge=1, le=100))
     image = hfg.Input(Gray)
     cube = hfg.Output(Cube)
     number = hfg.Event(int)
@@ -115,13 +117,16 @@ class CubeWatch(hfg.Node):
     last: hfg.State[Any] = hfg.State(None)
     told: hfg.State[Any] = hfg.State(None)
     count = hfg.State(0)
+    unread = hfg.State(0)  # pictures in a row, whatever was asked meanwhile
 
     def process(self, image: Gray) -> Cube:
         """Read, and tell what has become certain."""
         cube = read_cube.function(image)
         self.count = self.count + 1 if cube == self.last else 1
         self.last = cube
-        if self.count >= self.times and cube != self.told:
+        self.unread = self.unread + 1 if cube.state == "unreadable" else 0
+        certain = cube.state != "unreadable" or self.unread >= self.doubtful
+        if self.count >= self.times and certain and cube != self.told:
             self.told = cube
             if cube.state == "number":
                 self.number.trigger(cube.station)

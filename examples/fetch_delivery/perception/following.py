@@ -18,6 +18,7 @@ from hfg.nodes.robotics import Disk, scan_points
 
 _LEAST_AHEAD: Final = 0.15  # metres on the path that the robot aims ahead at least
 _REACTION: Final = 0.2  # seconds from a scan to wheels that obey
+_STANDS: Final = 0.02  # m/s: a robot that is held back stands as well
 _LOOK: Final = 1.0  # metres before the goal, from where on the robot turns to its heading
 
 
@@ -126,8 +127,7 @@ class FollowPath(hfg.Node):
     """Follow a path.
 
     Fires once for each pose with the scan of its time; it is silent without a path. A new path takes the place of the
-    old one without a stop. The last command is to stand. At the end of a path to where the robot waits it stands, and
-    has not arrived.
+    old one without a stop. The last command is to stand.
 
     Attributes:
       speed: top speed.
@@ -135,14 +135,15 @@ class FollowPath(hfg.Node):
       near: how near to the goal is there.
       aligned: and how near to its heading.
       patience: so long may the robot come no nearer to the goal before `blocked` tells.
-      queueing: and so long may it wait where it can wait for the goal.
       localised: where the robot is.
       scan: of the same time.
       command: the velocity.
       path: what is to be followed.
+      aside: the goal is taken now; this path leads to where the robot can wait for it.
       stop: follow nothing any more, and stand.
       arrived: the robot is at the goal.
-      blocked: it came no nearer for this number of seconds, or waited for as long; it keeps trying.
+      blocked: it came no nearer for too long; how far it still is. It keeps trying.
+      taken: the goal is taken; the path to where the robot can wait.
     """
 
     speed = hfg.Parameter(0.6, unit="m/s")
@@ -150,62 +151,43 @@ class FollowPath(hfg.Node):
     near = hfg.Parameter(0.04, unit="m")
     aligned = hfg.Parameter(0.04, unit="rad")
     patience = hfg.Parameter(3.0, unit="s")
-    queueing = hfg.Parameter(60.0, unit="s")
     localised = hfg.Input(Localised)
     scan = hfg.Input(Scan)
     command = hfg.Output(Twist)
     arrived = hfg.Event()
     blocked = hfg.Event(float)
+    taken = hfg.Event(Path)
 
     way: hfg.State[Any] = hfg.State(None)
     last: hfg.State[Any] = hfg.State(None)
     best = hfg.State(math.inf)
     since = hfg.State(0.0)
-    queues_since: hfg.State[float | None] = hfg.State(None)
+    goal_was: hfg.State[Any] = hfg.State(None)
 
     def process(self, localised: Localised, scan: Scan) -> Twist | None:
         """Take one step."""
         if self.way is None:
             stopping, self.last = self.last is not None, None
             return Twist() if stopping else None
-        speed = math.hypot(self.last.vx, self.last.vy) if self.last is not None else 0.0
         limits = Limits(speed=self.speed, near=self.near, aligned=self.aligned, foresight=self.foresight)
-        twist = follow(self.way, localised, scan, speed, limits)
-        waited = self._has_waited(scan.stamp, twist is None)
-        if twist is None and not self.way.waits:
+        twist = follow(self.way, localised, scan, _speed(self.last), limits)
+        if twist is None:
             self.way = self.last = None
             self.best = math.inf
             self.arrived.trigger()
             return Twist()
-        stalled = None
-        if twist is None:
-            self.last, self.since = None, scan.stamp
-        else:
-            stalled, self.last = self._stalled(localised, scan.stamp), twist
-        # One firing passes the activity on only once, so each way through here sends once at most.
-        if waited:
-            self.blocked.trigger(0.0)
-        elif stalled is not None:
+        self.last = twist
+        stalled = self._stalled(localised, scan.stamp)
+        if stalled is not None:
             self.blocked.trigger(stalled)
-        return twist or Twist()
-
-    def _has_waited(self, now: float, stands: bool) -> bool:
-        """Return whether it has waited for too long where it can wait for the goal."""
-        if not self.way.waits:
-            self.queues_since = None
-        elif self.queues_since is None:
-            self.queues_since = now if stands else None
-        elif now - self.queues_since > self.queueing:
-            self.queues_since = now
-            return True
-        return False
+        return twist
 
     def _stalled(self, localised: Localised, now: float) -> float | None:
         """Return how far it still is if it has come no nearer for too long."""
         goal = self.way.points[-1]
         remaining = _ahead(self.way.points, localised.pose[:2], 0.0)[0]
         remaining += 0.3 * abs(float(wrapped(self.way.heading - localised.pose[2])))
-        goal_moved = self.best == math.inf or np.hypot(*(goal - self._goal())) > 0.1
+        goal_moved = self.best == math.inf or np.hypot(*(goal - self.goal_was)) > 0.1
         if goal_moved or remaining < self.best - 0.05:
             self.best, self.since = remaining, now
             self.goal_was = goal
@@ -215,20 +197,84 @@ class FollowPath(hfg.Node):
             return remaining
         return None
 
-    def _goal(self) -> Any:
-        return self.goal_was
-
-    goal_was: hfg.State[Any] = hfg.State(None)
-
     @hfg.slot
     def path(self, path: Path) -> None:
         """Follow this one."""
         self.way = path
 
+    @hfg.slot(while_active=True)
+    def aside(self, path: Path) -> None:
+        """Follow nothing, and say that it has to wait."""
+        self.way, self.last, self.best = None, None, math.inf
+        self.taken.trigger(path)
+
     @hfg.slot
     def stop(self) -> None:
         """Follow nothing."""
-        self.way, self.best, self.queues_since = None, math.inf, None
+        self.way, self.best = None, math.inf
+
+
+class Queue(hfg.Node):
+    """Wait for another robot that has taken the goal, where there is room for it to leave.
+
+    Fires once for each pose with the scan of its time; it is silent without a path. At the end of the path it stands.
+
+    Attributes:
+      speed: top speed.
+      patience: so long may it stand before `blocked` tells.
+      localised: where the robot is.
+      scan: of the same time.
+      command: the velocity.
+      aside: the path to where it can wait; where activity arrives.
+      path: the goal is free; this path leads to it.
+      stop: wait for nothing any more, and stand.
+      free: the goal is free; the path to it.
+      blocked: it has waited for too long; it keeps waiting.
+    """
+
+    speed = hfg.Parameter(0.6, unit="m/s")
+    patience = hfg.Parameter(60.0, unit="s")
+    localised = hfg.Input(Localised)
+    scan = hfg.Input(Scan)
+    command = hfg.Output(Twist)
+    free = hfg.Event(Path)
+    blocked = hfg.Event()
+
+    way: hfg.State[Any] = hfg.State(None)
+    last: hfg.State[Any] = hfg.State(None)
+    since: hfg.State[float | None] = hfg.State(None)
+
+    def process(self, localised: Localised, scan: Scan) -> Twist | None:
+        """Take one step, or stand."""
+        if self.way is None:
+            return None
+        self.last = follow(self.way, localised, scan, _speed(self.last), Limits(speed=self.speed))
+        if self.since is None and _speed(self.last) < _STANDS:
+            self.since = scan.stamp
+        if self.since is not None and scan.stamp - self.since > self.patience:
+            self.since = scan.stamp
+            self.blocked.trigger()
+        return self.last or Twist()
+
+    @hfg.slot
+    def aside(self, path: Path) -> None:
+        """Wait there."""
+        self.way = path
+
+    @hfg.slot(while_active=True)
+    def path(self, path: Path) -> None:
+        """Say that it can go on."""
+        self.way = self.last = self.since = None
+        self.free.trigger(path)
+
+    @hfg.slot
+    def stop(self) -> None:
+        """Wait for nothing."""
+        self.way = self.last = self.since = None
+
+
+def _speed(twist: Twist | None) -> float:
+    return 0.0 if twist is None else math.hypot(twist.vx, twist.vy)
 
 
 class GiveWay(hfg.Node):

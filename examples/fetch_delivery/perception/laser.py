@@ -3,20 +3,36 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Any, Final
 
 import numpy as np
 from annotated_types import Ge, Interval
+from scipy.ndimage import median_filter
 
 import hfg
 from examples.fetch_delivery.messages import Scan
-from examples.fetch_delivery.perception import shape
 from examples.fetch_delivery.perception.records import Localised, Wall
+from examples.fetch_delivery.perception.shape import Shape
 from hfg.nodes.robotics import Disk, DiskTracks, find_disks, nearest_obstacle, scan_points
 
 _ROBOT: Final = 0.25  # its radius
 _FASTEST: Final = 0.7  # m/s
 _WIDE: Final = 0.42  # metres: of a robot's round back no straight piece is that wide
+
+
+@hfg.node
+def smooth_scan(scan: Scan, *, beams: Annotated[int, Interval(ge=1, le=31)] = 5) -> Scan:
+    """Take noise out of a scan: each beam becomes the median of its neighbours.
+
+    Args:
+      scan: of the laser.
+      beams: how many neighbours count, itself included; an odd number.
+
+    Returns:
+      out: the scan without single beams that are off.
+    """
+    return replace(scan, ranges=median_filter(scan.ranges, beams, mode="nearest"))
 
 
 @hfg.node
@@ -102,7 +118,7 @@ def other_robots(scan: Scan, localised: Localised) -> list[Disk]:
         return []
     places = foreign(scan, localised)
     disks = find_disks.function(places, localised.pose[None, :2], radius=_ROBOT, tolerance=0.05)
-    return [one for one in disks if _is_free(one)]
+    return [one for one in disks if _is_free(one, localised.shape)]
 
 
 class FollowRobots(hfg.Node):
@@ -162,11 +178,11 @@ def foreign(scan: Scan, localised: Localised) -> Any:
     points = scan_points.function(scan.ranges, scan.angles, max_range=scan.max_range)
     cos, sin = math.cos(localised.pose[2]), math.sin(localised.pose[2])
     places = points @ np.array([[cos, sin], [-sin, cos]]) + localised.pose[:2]
-    inside, outside = shape.distances(places)
+    inside, outside = localised.shape.distances(places)
     return places[(inside > 0.12) & (outside > 0.12)]
 
 
-def _is_free(disk: Disk) -> bool:
+def _is_free(disk: Disk, shape: Shape) -> bool:
     """Say whether a robot could stand there."""
     inside, outside = shape.distances(np.array([disk.x, disk.y]))
     return bool(inside > _ROBOT - 0.1 and outside > _ROBOT - 0.1)

@@ -1,8 +1,8 @@
-"""Where the robot is: odometry, corrected by laying each scan onto the known shape of the arena.
+"""Where the robot is: odometry, corrected by laying each scan onto the map, which the robot makes meanwhile.
 
-The arena looks the same after every turn by 45 degrees, and its wall alone after every turn by 11.25. So a robot that
-starts chooses one of the eight and keeps it; one that has lost itself keeps all of them in mind, and lets its odometry,
-the octagon and the digits that it has learned say which one it is.
+The arena looks the same after every turn by 45 degrees, and its wall, without the octagon, after every turn by 11.25.
+So a robot that starts chooses one of the eight and keeps it. One that has lost itself keeps all of them in mind. Its
+odometry, the octagon and the digits that it has learned say which one it is.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import numpy as np
 
 import hfg
 from examples.fetch_delivery.messages import Odometry, Scan
-from examples.fetch_delivery.perception import shape
+from examples.fetch_delivery.perception.mapping import Survey, circle_of, first_map
 from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, wrapped
+from examples.fetch_delivery.perception.shape import FLAT, STEP, TURN, WALL_SIDES, Shape
 from hfg.nodes.robotics import match_scan, scan_points
 
 _FIRST: Final = np.diag([0.05**2, 0.05**2, 0.03**2])
@@ -27,7 +28,16 @@ _WORST: Final = 4.0  # what one sighting can say against a place; a wrong one mu
 
 
 class Localiser:
-    """Follows the pose from scan to scan, and finds it again; the plain part of `Localise`."""
+    """Follows the pose from scan to scan, and finds it again; the plain part of `Localise`.
+
+    Attributes:
+      pose: in the map; None before the robot has found itself.
+      covariance: of the pose.
+      quality: how much of the last scan the map explains.
+      sure: whether it is the right one of the places that look the same.
+      lost: whether the scans do not fit any more.
+      survey: the map; None before there is one.
+    """
 
     def __init__(self) -> None:
         self.pose: Any = None
@@ -35,10 +45,11 @@ class Localiser:
         self.quality = 0.0
         self.sure = False
         self.lost = False
+        self.survey: Survey | None = None
         self._odometry: Any = None
         self._bad = 0
         # How likely it is that the true pose is ours turned by so many steps around the middle of the arena.
-        self._turned = np.full(shape.WALL_SIDES, _UNLIKELY)
+        self._turned = np.full(WALL_SIDES, _UNLIKELY)
         self._turned[0] = 0.0
 
     def update(self, scan: Scan, odometry: Odometry) -> Localised | None:
@@ -51,12 +62,14 @@ class Localiser:
             self._search(points)
         else:
             self._follow(points)
-        if self.pose is None:
+        if self.pose is None or self.survey is None:
             return None
         if not self.sure and not self.lost:
             self._compare(points)
+        elif not self._bad and not self.lost:
+            self.survey.learn(points, self.pose)
         sure = self.sure and not self._bad  # from the first scan that does not fit, not only when it has given up
-        return Localised(self.pose.copy(), self.covariance.copy(), self.quality, sure, scan.stamp)
+        return Localised(self.pose.copy(), self.covariance.copy(), self.quality, sure, scan.stamp, self.survey.shape)
 
     def seen(self, sightings: list[Sighting], signs: dict[int, Sign]) -> None:
         """Let digits whose places are known say which of the places that look the same is the right one."""
@@ -71,7 +84,7 @@ class Localiser:
             heading = self.pose[2]
             x = self.pose[0] + math.cos(heading) * one.x - math.sin(heading) * one.y
             y = self.pose[1] + math.sin(heading) * one.x + math.cos(heading) * one.y
-            turns = np.arange(shape.WALL_SIDES) * shape.STEP
+            turns = np.arange(WALL_SIDES) * STEP
             across = np.cos(turns) * x - np.sin(turns) * y - sign.x
             up = np.sin(turns) * x + np.cos(turns) * y - sign.y
             deviation = 0.25**2 + sign.sigma**2 + (0.04 * one.distance) ** 2
@@ -97,10 +110,12 @@ class Localiser:
         self.pose[2] = wrapped(self.pose[2])
 
     def _begin(self, points: Any) -> None:
-        """Find the first pose; of those that look the same the one whose heading is nearest to 0."""
-        found = _alike(_places(points))
-        if not found:
+        """Measure the arena, and find the first pose: of those that look the same the one that looks nearest to 0."""
+        shape = first_map(points)
+        found = _alike(_places(points, shape)) if shape is not None else []
+        if shape is None or not found:
             return
+        self.survey = Survey(shape)
         pose = min((one for one, _ in found), key=lambda one: abs(one[2]))
         best = max(fit for _, fit in found)
         self.pose, self.covariance = pose, _FIRST
@@ -110,10 +125,15 @@ class Localiser:
         self._weigh([kind for number, kind in kinds.items() if number])
         self._follow(points)
 
+    @property
+    def _shape(self) -> Shape:
+        assert self.survey is not None  # as soon as there is a pose
+        return self.survey.shape
+
     def _follow(self, points: Any) -> None:
         reach = min(0.4, 0.12 + 3 * math.sqrt(float(np.linalg.eigvalsh(self.covariance[:2, :2])[1])))
-        match = match_scan.function(points, self.pose, shape.SEGMENTS, self.covariance, reach=reach, rounds=8)
-        quality = _quality(points, match.pose)
+        match = match_scan.function(points, self.pose, self._shape.segments, self.covariance, reach=reach, rounds=8)
+        quality = _quality(points, match.pose, self._shape)
         if quality > 0.6 and match.share > 0.25:
             self.pose, self.covariance, self.quality = match.pose, match.covariance, quality
             self._bad = 0
@@ -128,7 +148,7 @@ class Localiser:
 
         That has jumped, or somebody has pushed the robot: by half a metre more likely than by three.
         """
-        found = _alike(_places(points))
+        found = _alike(_places(points, self._shape))
         if not found:
             return
         spread = self.covariance + np.diag([0.5**2, 0.5**2, 0.4**2])
@@ -141,12 +161,12 @@ class Localiser:
         best = int(np.argmax(likely))
         self.pose = found[best][0]
         self.covariance, self._bad, self.lost = _FIRST, 0, False
-        self.quality = _quality(points, self.pose)
+        self.quality = _quality(points, self.pose, self._shape)
         self._weigh([(pose, one - likely[best]) for (pose, _), one in zip(found, likely, strict=True)])
 
     def _weigh(self, others: list[tuple[Any, float]]) -> None:
         """Begin anew with how likely other places are that look the same, as logarithms against the present one."""
-        self._turned = np.full(shape.WALL_SIDES, _UNLIKELY)
+        self._turned = np.full(WALL_SIDES, _UNLIKELY)
         for pose, likely in others:
             turn = _apart(pose, self.pose)
             self._turned[turn] = max(self._turned[turn], likely)
@@ -155,7 +175,7 @@ class Localiser:
 
     def _compare(self, points: Any) -> None:
         """While in doubt, let the octagon speak: in a place where it would not fit, the robot is not."""
-        fits = [_fit(points, _turned(self.pose, turn)) for turn in range(4)]
+        fits = [_fit(points, _turned(self.pose, turn), self._shape) for turn in range(4)]
         self._turned += np.tile(np.array(fits) - fits[0], 8)  # the arena looks the same after each fourth turn
         self._decide()
 
@@ -164,7 +184,7 @@ class Localiser:
         best = int(np.argmax(self._turned))
         if best and self._turned[best] > self._turned[0] + _MARGIN:
             self.pose = _turned(self.pose, best)
-            turn = best * shape.STEP
+            turn = best * STEP
             change = np.array([[math.cos(turn), -math.sin(turn), 0], [math.sin(turn), math.cos(turn), 0], [0, 0, 1]])
             self.covariance = change @ self.covariance @ change.T
             self._turned = np.roll(self._turned, -best)
@@ -187,17 +207,17 @@ def _alike(found: list[tuple[Any, float]]) -> list[tuple[Any, float]]:
 
 def _apart(pose: Any, other: Any) -> int:
     """Return by how many steps a pose is turned around the middle of the arena, against another that looks the same."""
-    return round(float(wrapped(pose[2] - other[2])) / shape.STEP) % shape.WALL_SIDES
+    return round(float(wrapped(pose[2] - other[2])) / STEP) % WALL_SIDES
 
 
 def _turned(pose: Any, steps: int) -> Any:
     """Return a pose after a turn around the middle of the arena."""
-    turn = steps * shape.STEP
+    turn = steps * STEP
     cos, sin = math.cos(turn), math.sin(turn)
     return np.array([cos * pose[0] - sin * pose[1], sin * pose[0] + cos * pose[1], wrapped(pose[2] + turn)])
 
 
-def _quality(points: Any, pose: Any) -> float:
+def _quality(points: Any, pose: Any, shape: Shape) -> float:
     """Return how many of the points lie on the shape, of those that nothing else can explain.
 
     Something in free space may be another robot. What lies beyond the wall or within the octagon, or on neither
@@ -208,12 +228,12 @@ def _quality(points: Any, pose: Any) -> float:
     inside, outside = shape.distances(places)
     on = (np.abs(inside) < 0.08) | (np.abs(outside) < 0.08)
     wrong = (inside < -0.15) | (outside < -0.15)
-    through = _crosses_octagon(places, pose) & ~wrong & ~(np.abs(outside) < 0.15)
+    through = _crosses_octagon(places, pose, shape.octagon) & ~wrong & ~(np.abs(outside) < 0.15)
     told = int(on.sum()) + int(wrong.sum()) + int(through.sum())
     return float((on & ~through).sum() / told) if told else 0.0
 
 
-def _fit(points: Any, pose: Any) -> float:
+def _fit(points: Any, pose: Any, shape: Shape) -> float:
     """Return the logarithm of how likely the points are from a pose; what lies far off says no more than what is off.
 
     Neighbouring beams err alike, so they count as a fifth of what they would count for by themselves.
@@ -224,22 +244,22 @@ def _fit(points: Any, pose: Any) -> float:
     return -0.2 * float(np.minimum(near * near / 2, 4.5).sum())
 
 
-def _crosses_octagon(places: Any, pose: Any) -> Any:
+def _crosses_octagon(places: Any, pose: Any, octagon: float) -> Any:
     """Say which beams would have had to go through the middle of the octagon."""
     rays = places - pose[:2]
     length = np.maximum((rays**2).sum(1), 1e-9)
     share = np.clip(-(rays @ pose[:2]) / length, 0, 1)
     nearest = pose[:2] + share[:, None] * rays
-    return np.hypot(nearest[:, 0], nearest[:, 1]) < shape.OCTAGON_APOTHEM - 0.15
+    return np.hypot(nearest[:, 0], nearest[:, 1]) < octagon - 0.15
 
 
-def _places(points: Any) -> list[tuple[Any, float]]:
+def _places(points: Any, shape: Shape) -> list[tuple[Any, float]]:
     """Find all poses from which the arena would look like this, with how well it does."""
-    middle = _middle(points)
+    middle = circle_of(points, shape.radius * (1 + FLAT) / 2)
     if middle is None:
         return []
     some = points[:: max(1, len(points) // 120)]
-    headings = np.arange(0, shape.TURN, math.radians(0.75))
+    headings = np.arange(0, TURN, math.radians(0.75))
     cos, sin = np.cos(headings)[:, None], np.sin(headings)[:, None]
     across, up = some[:, 0] - middle[0], some[:, 1] - middle[1]
     inside, outside = shape.distances(np.stack([cos * across - sin * up, sin * across + cos * up], 2))
@@ -251,48 +271,14 @@ def _places(points: Any) -> list[tuple[Any, float]]:
         heading = float(headings[peak])
         turn = np.array([[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]])
         guess = np.append(-turn @ middle, heading)
-        match = match_scan.function(points, guess, shape.SEGMENTS, np.diag([0.01, 0.01, 0.003]), reach=0.15)
-        quality = _quality(points, match.pose)
+        match = match_scan.function(points, guess, shape.segments, np.diag([0.01, 0.01, 0.003]), reach=0.15)
+        quality = _quality(points, match.pose, shape)
         if quality < 0.75 or match.share < 0.3:
             continue
         if any(np.abs(wrapped(match.pose[2] - other[2])) < 0.05 for other, _ in found):
             continue
-        found.append((match.pose, _fit(points, match.pose)))
+        found.append((match.pose, _fit(points, match.pose, shape)))
     return [(_turned(pose, 4 * turn), fit) for pose, fit in found for turn in range(8)]
-
-
-def _middle(points: Any) -> Any:
-    """Find the middle of the arena in the robot's frame: of the circles through two points the one with most on it."""
-    some = points[:: max(1, len(points) // 90)]
-    if len(some) < 12:
-        return None
-    first, second = np.triu_indices(len(some), 7)
-    first, second = first[::7], second[::7]
-    chord = some[second] - some[first]
-    length = np.hypot(chord[:, 0], chord[:, 1])
-    radius = (shape.WALL_RADIUS + shape.WALL_APOTHEM) / 2
-    wide = (length > 1.0) & (length < 1.9 * radius)
-    chord, length, first = chord[wide], length[wide], first[wide]
-    if not len(chord):
-        return None
-    up = np.sqrt(radius**2 - (length / 2) ** 2)[:, None] * np.stack([-chord[:, 1], chord[:, 0]], 1) / length[:, None]
-    half = some[first] + chord / 2
-    middles = np.concatenate([half + up, half - up])
-    middles = middles[np.hypot(middles[:, 0], middles[:, 1]) < shape.WALL_RADIUS]  # the robot is inside
-    if not len(middles):
-        return None
-    far = np.hypot(middles[:, None, 0] - some[:, 0], middles[:, None, 1] - some[:, 1])
-    votes = np.maximum(1 - np.abs(far - radius) / 0.08, 0).sum(1)
-    middle = middles[int(np.argmax(votes))]
-    for _ in range(5):
-        rays = points - middle
-        far = np.hypot(rays[:, 0], rays[:, 1])
-        on = np.abs(far - radius) < 0.1
-        if on.sum() < 10:
-            return None
-        slopes, off = -rays[on] / far[on, None], far[on] - radius
-        middle = middle + np.linalg.lstsq(slopes, -off, rcond=None)[0]
-    return middle
 
 
 class Localise(hfg.Node):

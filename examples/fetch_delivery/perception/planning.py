@@ -1,7 +1,8 @@
-"""A path to a place: over a grid of what the arena's shape leaves free, around the robots that the laser shows."""
+"""A path to a place: over a grid of what the walls of the map leave free, around the robots that the laser shows."""
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,12 +13,12 @@ from annotated_types import Ge
 
 import hfg
 from examples.fetch_delivery.messages import Vector
-from examples.fetch_delivery.perception import shape
 from examples.fetch_delivery.perception.records import Localised
+from examples.fetch_delivery.perception.shape import Shape
 from hfg.nodes.robotics import Disk, plan_path
 
 CELL: Final = 0.1
-_SIDE: Final = 6.2
+_SIDE: Final = 6.5
 RADIUS: Final = 0.25  # of every robot
 _WALL: Final = 0.29  # what the middle of the robot keeps from walls
 _ROBOT: Final = 0.6  # what it keeps from the middle of another robot
@@ -28,7 +29,6 @@ _QUEUE: Final = (1.2, 1.6)  # so far from a lane that is taken a robot waits
 
 _AT: Final = np.arange(-_SIDE + CELL / 2, _SIDE, CELL)
 _CELLS: Final = np.stack(np.meshgrid(_AT, _AT, indexing="ij"), 2)
-_CLEAR: Final = np.minimum(*shape.distances(_CELLS)) - _WALL
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,18 +38,17 @@ class Path:
     Attributes:
       points: of the map frame, in metres; the last is the goal.
       heading: that the robot should have there.
-      waits: the goal is taken; the path leads to where the robot can wait for it.
     """
 
     points: Vector
     heading: float
-    waits: bool = False
 
 
-def plan(start: Any, goal: Any, others: Sequence[Disk] = (), *, beside: bool = False) -> Vector | None:
+def plan(shape: Shape, start: Any, goal: Any, others: Sequence[Disk] = (), *, beside: bool = False) -> Vector | None:
     """Return the points of a path from one place of the map frame to another; None if there is none.
 
     Args:
+      shape: the map.
       start: where the robot is.
       goal: where it should go.
       others: robots, which it keeps away from: more from where they will be soon, and more from their one side than
@@ -57,7 +56,7 @@ def plan(start: Any, goal: Any, others: Sequence[Disk] = (), *, beside: bool = F
       beside: lead to the nearest place that is free if the goal is not.
     """
     start, goal = np.array(start[:2], np.float64), np.array(goal[:2], np.float64)
-    clear = _clear(others)
+    clear = _clear(shape, others)
     # Near to something it is dearer, so that the path keeps away where there is room.
     costs = np.where(clear > 0, 1 + 3 * np.exp(-np.maximum(clear, 0) / 0.2), np.inf)
     for one in others:
@@ -73,7 +72,7 @@ def plan(start: Any, goal: Any, others: Sequence[Disk] = (), *, beside: bool = F
     return plan_path.function(costs, start, goal, cell=CELL, left=-_SIDE, lower=-_SIDE)
 
 
-def queue(start: Any, goal: Any, others: Sequence[Disk], lane: float) -> tuple[Vector, float] | None:
+def queue(shape: Shape, start: Any, goal: Any, others: Sequence[Disk], lane: float) -> tuple[Vector, float] | None:
     """Return the path to where a robot can wait, and its heading there, if its goal is taken.
 
     A goal before a station is taken while another robot is in the lane that leads on from there to the station, and is
@@ -81,6 +80,7 @@ def queue(start: Any, goal: Any, others: Sequence[Disk], lane: float) -> tuple[V
     leave, and sees it leave.
 
     Args:
+      shape: the map.
       start: where the robot is.
       goal: the pose to which it should go.
       others: robots.
@@ -101,8 +101,8 @@ def queue(start: Any, goal: Any, others: Sequence[Disk], lane: float) -> tuple[V
     points = np.stack([start, start])
     if not _QUEUE[0] - 0.1 <= away <= _QUEUE[1] + 0.1:
         off = _from_lane(_CELLS, first, last)
-        place = _nearest((_clear(others) > 0.1) & (off >= _QUEUE[0]) & (off <= _QUEUE[1]), start)
-        path = plan(start, place, others)
+        place = _nearest((_clear(shape, others) > 0.1) & (off >= _QUEUE[0]) & (off <= _QUEUE[1]), start)
+        path = plan(shape, start, place, others)
         points = points if path is None else path
     return points, heading_towards(points[-1], last)
 
@@ -116,11 +116,16 @@ def _from_lane(place: Any, first: Any, last: Any) -> Any:
     return np.hypot(off[..., 0], off[..., 1])
 
 
-def _clear(others: Sequence[Disk]) -> Any:
-    clear = _CLEAR
+def _clear(shape: Shape, others: Sequence[Disk]) -> Any:
+    clear = _clear_of_walls(shape)
     for one in others:
         clear = np.minimum(clear, _far(one.x, one.y) - _ROBOT)
     return clear
+
+
+@functools.lru_cache(maxsize=4)
+def _clear_of_walls(shape: Shape) -> Any:
+    return np.minimum(*shape.distances(_CELLS)) - _WALL
 
 
 def _far(x: float, y: float) -> Any:
@@ -150,6 +155,7 @@ class PlanPath(hfg.Node):
       localised: where the robot is.
       others: other robots, in the map frame.
       path: the way to the goal.
+      aside: the way to where the robot can wait for the goal, which another one has taken.
       goal: the pose in the map frame that is to be reached; it is planned with the next pose.
       stop: there is no goal any more.
       no_path: there is no way to the goal now; it is tried again.
@@ -160,6 +166,7 @@ class PlanPath(hfg.Node):
     localised = hfg.Input(Localised)
     others = hfg.Input(list[Disk])
     path = hfg.Output(Path)
+    aside = hfg.Event(Path)
     no_path = hfg.Event()
 
     wanted: hfg.State[Any] = hfg.State(None)
@@ -172,10 +179,11 @@ class PlanPath(hfg.Node):
         self.since += 1
         if self.since % self.every != 1 and self.every > 1:
             return None
-        waiting = queue(localised.pose, self.wanted, others, self.lane) if self.lane else None
+        waiting = queue(localised.shape, localised.pose, self.wanted, others, self.lane) if self.lane else None
         if waiting is not None:
-            return Path(*waiting, waits=True)
-        points = plan(localised.pose, self.wanted, others, beside=not self.lane)
+            self.aside.trigger(Path(*waiting))
+            return None
+        points = plan(localised.shape, localised.pose, self.wanted, others, beside=not self.lane)
         if points is None:
             self.no_path.trigger()
             return None

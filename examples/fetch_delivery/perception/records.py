@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from examples.fetch_delivery.messages import Vector
+from examples.fetch_delivery.perception.shape import Shape
 
 
 class Sighting(NamedTuple):
@@ -73,6 +74,7 @@ class Localised:
       quality: how much of the scan the arena's shape explains, of what other robots do not hide, 0 to 1.
       sure: false while the robot is lost, or while several places look the same to it.
       stamp: of the scan.
+      shape: the map: how large the arena is, as far as it has been measured.
     """
 
     pose: Vector
@@ -80,6 +82,7 @@ class Localised:
     quality: float
     sure: bool
     stamp: float
+    shape: Shape
 
     @property
     def fits(self) -> bool:
@@ -127,6 +130,11 @@ class Station(NamedTuple):
     y: float
     theta: float
     sightings: int = 0
+
+    @classmethod
+    def side(cls, shape: Shape, number: int, sightings: int = 0) -> Station:
+        """Return the station on a side of the octagon."""
+        return cls(*shape.side(number), sightings)
 
     def before(self, distance: float) -> Vector:
         """Return the pose at a distance before the surface, that faces it."""

@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import hfg
-from examples.fetch_delivery.perception import shape
 from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, Station, wrapped
 from hfg.nodes.robotics import Landmark, LandmarkMixture
 
@@ -25,8 +24,8 @@ def landmark(seen: Sighting, localised: Localised) -> Landmark:
 
 def delivery_station(sign: Sign) -> Station:
     """Return the station that a digit belongs to: its bull's-eye hangs on the wall, to the right of the digit."""
-    at = math.atan2(sign.y, sign.x) - BESIDE
-    x, y = shape.WALL_APOTHEM * math.cos(at), shape.WALL_APOTHEM * math.sin(at)
+    at, far = math.atan2(sign.y, sign.x) - BESIDE, math.hypot(sign.x, sign.y)
+    x, y = far * math.cos(at), far * math.sin(at)
     return Station(x, y, float(wrapped(at + math.pi)), int(sign.sightings))
 
 
@@ -60,12 +59,13 @@ class SignMap(hfg.Node):
         if localised.sure:
             for one in sightings:
                 seen = landmark(one, localised)
-                if one.label.isdecimal() and abs(math.hypot(seen.x, seen.y) - shape.WALL_APOTHEM) < 0.6:
+                if one.label.isdecimal() and abs(math.hypot(seen.x, seen.y) - localised.shape.apothem) < 0.6:
                     self.mixture.learn(seen)
-        return {
-            int(label): Sign(one.x, one.y, one.heading, one.sigma, one.sightings)
-            for label, one in self.mixture.known(self.least).items()
-        }
+        signs = {}
+        for label, one in self.mixture.known(self.least).items():
+            x, y, _ = localised.shape.on_wall(math.atan2(one.y, one.x))  # it hangs there, however far a camera says
+            signs[int(label)] = Sign(x, y, one.heading, one.sigma, one.sightings)
+        return signs
 
     @hfg.slot
     def forget(self, digit: int) -> None:

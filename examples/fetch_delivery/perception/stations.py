@@ -9,8 +9,8 @@ import numpy as np
 
 import hfg
 from examples.fetch_delivery.messages import Scan
-from examples.fetch_delivery.perception import shape
 from examples.fetch_delivery.perception.records import Localised, Sighting, Station, wrapped
+from examples.fetch_delivery.perception.shape import TURN, Shape
 from examples.fetch_delivery.perception.signs import landmark
 from hfg.nodes.robotics import LandmarkMixture, scan_points
 
@@ -29,12 +29,12 @@ def octagon_sides(scan: Scan, localised: Localised) -> list[Station]:
     points = scan_points.function(scan.ranges, scan.angles, max_range=scan.max_range)
     cos, sin = math.cos(localised.pose[2]), math.sin(localised.pose[2])
     places = points @ np.array([[cos, sin], [-sin, cos]]) + localised.pose[:2]
-    _, outside = shape.distances(places)
+    _, outside = localised.shape.distances(places)
     places = places[np.abs(outside) < 0.12]
-    sides = np.round(np.arctan2(places[:, 1], places[:, 0]) / shape.TURN).astype(int) % 8
+    sides = np.round(np.arctan2(places[:, 1], places[:, 0]) / TURN).astype(int) % 8
     found = []
     for side in range(8):
-        theta = side * shape.TURN
+        theta = side * TURN
         normal, along = np.array([math.cos(theta), math.sin(theta)]), np.array([-math.sin(theta), math.cos(theta)])
         on = places[sides == side]
         at = on @ along
@@ -79,35 +79,26 @@ class StationMap(hfg.Node):
         if localised.sure:
             for one in targets:
                 self._learn(one, localised)
-        self.filling.send(self._filling())
-        self.delivery.send(self._delivery())
+        self.filling.send(self._filling(localised.shape))
+        self.delivery.send(self._delivery(localised.shape))
 
     def _learn(self, one: Sighting, localised: Localised) -> None:
         seen = landmark(one, localised)
         far, at = math.hypot(seen.x, seen.y), math.atan2(seen.y, seen.x)
-        if abs(far - shape.OCTAGON_APOTHEM) < 0.35:
-            side = round(at / shape.TURN)
-            if abs(at - side * shape.TURN) * far < 0.25:
+        if abs(far - localised.shape.octagon) < 0.35:
+            side = round(at / TURN)
+            if abs(at - side * TURN) * far < 0.25:
                 self.sides[side % 8] += 1
-        elif abs(far - shape.WALL_APOTHEM) < 0.5:
+        elif abs(far - localised.shape.apothem) < 0.5:
             # They all look the same, so each is called by its part of the wall.
-            self.walls.learn(seen._replace(label=f"{round(at / shape.TURN) % 8}"))
+            self.walls.learn(seen._replace(label=f"{round(at / TURN) % 8}"))
 
-    def _filling(self) -> list[Station]:
+    def _filling(self, shape: Shape) -> list[Station]:
         parity = int(self.sides[1::2].sum() > self.sides[0::2].sum())
         if self.sides[parity::2].max() < self.least:
             return []
-        stations = []
-        for side in range(parity, 8, 2):
-            theta = float(wrapped(side * shape.TURN))
-            x, y = shape.OCTAGON_APOTHEM * math.cos(theta), shape.OCTAGON_APOTHEM * math.sin(theta)
-            stations.append(Station(x, y, theta, int(self.sides[side])))
-        return stations
+        return [Station.side(shape, side, int(self.sides[side])) for side in range(parity, 8, 2)]
 
-    def _delivery(self) -> list[Station]:
-        stations = []
-        for one in self.walls.known(float(self.least)).values():
-            at = math.atan2(one.y, one.x)
-            x, y = shape.WALL_APOTHEM * math.cos(at), shape.WALL_APOTHEM * math.sin(at)
-            stations.append(Station(x, y, float(wrapped(at + math.pi)), int(one.sightings)))
-        return stations
+    def _delivery(self, shape: Shape) -> list[Station]:
+        known = self.walls.known(float(self.least)).values()
+        return [Station(*shape.on_wall(math.atan2(one.y, one.x)), int(one.sightings)) for one in known]

@@ -40,7 +40,7 @@ def arena(simulation: Simulation, scans: Sequence[Scan | None]) -> Scene:
         _robot(scene, body, COLOURS[number], simulation.cube(number))
     for _, station, seconds in simulation.handing_over():
         _operator(scene, station, seconds)
-    if simulation.light < 1:
+    if simulation.light != 1:
         scene.text(f"light {100 * simulation.light:.0f} %", (HALF - 0.1, HALF - 0.5), 0.42, "soft", anchor="end")
     return scene
 

@@ -135,6 +135,7 @@ class Observer:
             "signs.signs": self._signs,
             "stations.filling": self._filling,
             "plan.path": self._path,
+            "plan.aside": self._path,
             "cube.number": self._number,
             "cube.none": self._none,
         }
@@ -154,7 +155,7 @@ class Observer:
             seen.active[step] = event.time
             return
         seen.active.pop(step, None)
-        if step.endswith("/follow"):
+        if step.endswith(("/follow", "/queue")):
             seen.path = None
 
     def _front(self, robot: int, value: object) -> None:

@@ -16,7 +16,7 @@ from examples.fetch_delivery.messages import Picture, Vector
 from examples.fetch_delivery.showing import cameras
 from examples.fetch_delivery.showing.observing import Seen
 from examples.fetch_delivery.world import Arena, Simulation, Station
-from examples.fetch_delivery.world.arena import DIGIT_BESIDE, OCTAGON_M, WALL_PANELS
+from examples.fetch_delivery.world.arena import DIGIT_BESIDE, WALL_PANELS
 from examples.fetch_delivery.world.robots import RADIUS_M
 from examples.fetch_delivery.world.robots import Robot as Body
 
@@ -70,7 +70,7 @@ def corners(arena: Arena) -> tuple[Vector, Vector]:
     """Return the corners of the wall and of the octagon."""
     wall = 2 * math.pi * np.arange(WALL_PANELS) / WALL_PANELS
     octagon = math.pi / 4 * (np.arange(8) + 0.5)
-    radius = arena.apothem / math.cos(math.pi / WALL_PANELS), OCTAGON_M / math.cos(math.pi / 8)
+    radius = arena.radius, arena.octagon_m / math.cos(math.pi / 8)
     return tuple(  # type: ignore[return-value]
         far * np.stack([np.cos(at), np.sin(at)], axis=1) for far, at in zip(radius, (wall, octagon), strict=True)
     )

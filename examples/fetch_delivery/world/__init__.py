@@ -6,6 +6,7 @@ simulation ── robots ── arena
 ├──── scanning ──── what the lasers see
 ├──── operators ─── people who put cubes in and take them out
 ├──── faults ────── what can be made to go wrong, by name
+├──── surroundings ─ how large everything is, and how badly is measured
 └──── scoring ───── what counts
 """
 
@@ -13,5 +14,18 @@ from examples.fetch_delivery.world.arena import Arena, Station
 from examples.fetch_delivery.world.faults import FAULTS, Fault, fault
 from examples.fetch_delivery.world.scoring import Score
 from examples.fetch_delivery.world.simulation import Cameras, Simulation
+from examples.fetch_delivery.world.surroundings import LIMITS, USUAL, Surroundings
 
-__all__ = ["FAULTS", "Arena", "Cameras", "Fault", "Score", "Simulation", "Station", "fault"]
+__all__ = [
+    "FAULTS",
+    "LIMITS",
+    "USUAL",
+    "Arena",
+    "Cameras",
+    "Fault",
+    "Score",
+    "Simulation",
+    "Station",
+    "Surroundings",
+    "fault",
+]

@@ -1,6 +1,6 @@
 """Where the walls, signs and stations are.
 
-A circle of panels, twelve metres wide, round an octagon with the four filling stations; on the outer wall four
+A circle of panels, about twelve metres wide, round an octagon with the four filling stations; on the outer wall four
 delivery stations, between the filling stations as seen from the middle. Which digit hangs at which is drawn by lot. The
 frame has its origin in the middle.
 """
@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from examples.fetch_delivery.messages import Vector
+from examples.fetch_delivery.world.surroundings import USUAL
 
-RADIUS_M = 6.0
 WALL_PANELS = 32
-OCTAGON_M = 1.25  # from its middle to each side
 WALL_HEIGHT_M = 0.5
 DIGIT_BESIDE = 0.11  # by this angle, seen from the middle, a digit hangs to the left of its bull's-eye
 
@@ -68,22 +67,33 @@ class Arena:
     """What stands still.
 
     Attributes:
+      radius: of the outer wall, to its corners.
+      apothem: of the outer wall, to the middles of its panels.
+      octagon_m: from the middle of the octagon to each side.
       wall: the outer wall; the robots are inside of it.
       octagon: the middle; the robots are outside of it.
       stations: the four filling stations, then the four delivery stations by their digits.
     """
 
-    def __init__(self, digits: tuple[int, ...] = (1, 2, 3, 4)) -> None:
-        """Build it; `digits` are those of the delivery stations, counter-clockwise.
+    def __init__(
+        self, digits: tuple[int, ...] = (1, 2, 3, 4), *, radius: float = USUAL.radius, octagon: float = USUAL.octagon
+    ) -> None:
+        """Build it.
+
+        Args:
+          digits: those of the delivery stations, counter-clockwise.
+          radius: of the outer wall, to its corners.
+          octagon: from its middle to each side.
 
         Raises:
           ValueError: if these are not the digits 1 to 4 in some order.
         """
         if sorted(digits) != [1, 2, 3, 4]:
             raise ValueError(f"delivery stations bear the digits 1 to 4, each once, not {digits}")
-        self.apothem = RADIUS_M * math.cos(math.pi / WALL_PANELS)
+        self.radius, self.octagon_m = radius, octagon
+        self.apothem = radius * math.cos(math.pi / WALL_PANELS)
         self.wall = _polygon(2 * math.pi * (np.arange(WALL_PANELS) + 0.5) / WALL_PANELS, self.apothem)
-        self.octagon = _polygon(math.pi / 4 * np.arange(8), OCTAGON_M)
+        self.octagon = _polygon(math.pi / 4 * np.arange(8), octagon)
         filling = [self._filling(number) for number in range(4)]
         delivery = [self._delivery(place, digit) for place, digit in enumerate(digits)]
         self.stations = (*filling, *sorted(delivery, key=lambda station: station.number))
@@ -106,7 +116,7 @@ class Arena:
 
     def _filling(self, number: int) -> Station:
         angle = math.pi / 2 * number
-        return Station("filling", number, OCTAGON_M * math.cos(angle), OCTAGON_M * math.sin(angle), angle)
+        return Station("filling", number, self.octagon_m * math.cos(angle), self.octagon_m * math.sin(angle), angle)
 
     def _delivery(self, place: int, digit: int) -> Station:
         angle, distance = math.pi / 2 * place + math.pi / 4, self.apothem - 0.05

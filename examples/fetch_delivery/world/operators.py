@@ -1,8 +1,8 @@
 """The people at the stations: they put a cube into a robot's basket, or take it out, when its lamp is on.
 
 Within two to ten seconds, by the rules; now and then they are late, put the cube in askew so that its bar code cannot
-be read until they set it right, or overlook a lamp until it goes on again. A robot that brings a cube back to a filling
-station gets another one for it.
+be read until they set it right, or overlook a lamp until it is switched on again. A robot that brings a cube back to a
+filling station gets another one for it.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from examples.fetch_delivery.world.arena import Arena, Station
 from examples.fetch_delivery.world.rendering import Cube
+from examples.fetch_delivery.world.surroundings import USUAL
 
 REACH_M = {"filling": 0.75, "delivery": 0.9}
 PROMPT_S = (2.0, 10.0)
@@ -59,6 +60,7 @@ class Operator:
         cube: Cube | None,
         arena: Arena,
         unreadable: tuple[int, ...] = (),
+        reach: float = USUAL.reach,
     ) -> Handover | None:
         """Look at a robot once more.
 
@@ -69,12 +71,13 @@ class Operator:
           cube: what lies in its basket.
           arena: where the stations are.
           unreadable: which of the cubes that it gets, counted from 1, have a smeared bar code.
+          reach: how far from a sign the operator reaches.
         """
         if not lamp:
             self._due_s = None
             return None
         station = arena.nearest(*at)
-        if station.distance(*at) > REACH_M[station.kind]:
+        if station.distance(*at) > min(REACH_M[station.kind], reach):
             return None
         if self._due_s is None:
             self._due_s = now_s + self._delay()

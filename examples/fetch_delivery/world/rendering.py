@@ -19,7 +19,7 @@ import numpy as np
 
 from examples.fetch_delivery import signs
 from examples.fetch_delivery.messages import Picture, Vector
-from examples.fetch_delivery.world.arena import DIGIT_BESIDE, OCTAGON_M, RADIUS_M, WALL_HEIGHT_M, WALL_PANELS, Arena
+from examples.fetch_delivery.world.arena import DIGIT_BESIDE, WALL_HEIGHT_M, WALL_PANELS, Arena
 
 WIDTH, HEIGHT = 640, 480
 FOCAL_PX = HEIGHT / 2 / math.tan(math.radians(46) / 2)
@@ -112,6 +112,7 @@ class Renderer:
             self._prints[f"cube {number}"] = _smaller_and_smaller(face)
             self._prints[f"smeared {number}"] = _smaller_and_smaller(smeared)
         self._outer, self._inner = _Panels(), _Panels()
+        self._octagon_m = arena.octagon_m
         self._set_up_walls(arena)
         self._set_up_signs(arena)
         self._outer.close()
@@ -135,6 +136,7 @@ class Renderer:
         sideways: float = 0.0,
         shake: tuple[int, int] = (0, 0),
         light: float = 1.0,
+        exposure_s: float = EXPOSURE_S,
     ) -> Picture:
         """Take a picture with the front camera.
 
@@ -145,10 +147,11 @@ class Renderer:
           turning: how fast the robot turns, in rad/s; blurs the picture.
           sideways: how fast it moves to its side, in m/s; blurs it a little.
           shake: where the noise is cut from, below 128 each.
-          light: how bright it is, from 0 to 1. The noise stays the same.
+          light: how bright it is, 1 as usual. The noise stays the same.
+          exposure_s: how long it is exposed; blurs what moves.
         """
         picture = self._draw_front(pose, around, hidden)
-        length = round(FOCAL_PX * EXPOSURE_S * (abs(turning) + abs(sideways) / 3))
+        length = round(FOCAL_PX * exposure_s * (abs(turning) + abs(sideways) / 3))
         if length > 1:
             picture = np.asarray(cv2.blur(picture, (length, 1)), np.uint8)
         return self._with_noise(_lit(picture, light), shake)
@@ -164,7 +167,7 @@ class Renderer:
         eye, turn = _camera(pose, FRONT)
         picture = self._empty.copy()
         self._paint(picture, self._outer, eye, turn, hidden)
-        far, near = _before_and_behind(eye, around)
+        far, near = _before_and_behind(eye, around, self._octagon_m)
         for thing in far:
             _paint_round(picture, thing, eye, turn)
         self._paint(picture, self._inner, eye, turn, hidden)
@@ -192,14 +195,14 @@ class Renderer:
         return picture
 
     def _set_up_walls(self, arena: Arena) -> None:
-        half = RADIUS_M * math.sin(math.pi / WALL_PANELS)
+        half = arena.radius * math.sin(math.pi / WALL_PANELS)
         for number, (nx, ny) in enumerate(arena.wall.normals):
             middle = (arena.apothem * nx, arena.apothem * ny, WALL_HEIGHT_M / 2)
             facing = math.atan2(ny, nx) + math.pi
             self._outer.add(_standing(*middle, facing, half, WALL_HEIGHT_M / 2), 150 + number % 2 * 6)
-        half = OCTAGON_M * math.tan(math.pi / 8)
+        half = arena.octagon_m * math.tan(math.pi / 8)
         for number, (nx, ny) in enumerate(arena.octagon.normals):
-            middle = (OCTAGON_M * nx, OCTAGON_M * ny, WALL_HEIGHT_M / 2)
+            middle = (arena.octagon_m * nx, arena.octagon_m * ny, WALL_HEIGHT_M / 2)
             self._inner.add(_standing(*middle, math.atan2(ny, nx), half, WALL_HEIGHT_M / 2), 165 + number % 2 * 6)
 
     def _set_up_signs(self, arena: Arena) -> None:
@@ -253,9 +256,9 @@ def _camera(pose: tuple[float, float, float], camera: Camera) -> tuple[Vector, V
     return eye, turn
 
 
-def _before_and_behind(eye: Vector, around: tuple[Round, ...]) -> tuple[list[Round], list[Round]]:
+def _before_and_behind(eye: Vector, around: tuple[Round, ...], octagon_m: float) -> tuple[list[Round], list[Round]]:
     """Sort what stands about from far to near, and by whether the octagon can hide it."""
-    tangent = math.sqrt(max(eye[0] ** 2 + eye[1] ** 2 - OCTAGON_M**2, 0.0))
+    tangent = math.sqrt(max(eye[0] ** 2 + eye[1] ** 2 - octagon_m**2, 0.0))
     by_distance = sorted(around, key=lambda thing: -math.hypot(thing.x - eye[0], thing.y - eye[1]))
     away = [math.hypot(thing.x - eye[0], thing.y - eye[1]) for thing in by_distance]
     far = [thing for thing, distance in zip(by_distance, away, strict=True) if distance > tangent]

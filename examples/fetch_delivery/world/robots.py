@@ -52,8 +52,10 @@ class Robot:
       odometry: where the wheels say it is, from where it began.
     """
 
-    def __init__(self, pose: tuple[float, float, float], limits: Limits, random: np.random.Generator) -> None:
-        """Put it somewhere; `random` decides how its odometry drifts."""
+    def __init__(
+        self, pose: tuple[float, float, float], limits: Limits, random: np.random.Generator, drift: float = 1.0
+    ) -> None:
+        """Put it somewhere; `random` decides how its odometry drifts, `drift` by how many times of the usual."""
         self.x, self.y, self.theta = pose
         self.vx = self.vy = self.omega = 0.0
         self.limits = limits
@@ -64,7 +66,10 @@ class Robot:
         self._commanded_s = -math.inf
         self._random = random
         # One to two per cent of the way and of the turns, either sign, for the whole run; the rest is noise.
-        self._way, self._turns, self._skew = (1 + random.choice((-1, 1)) * random.uniform(0.01, 0.02) for _ in range(3))
+        self._way, self._turns, self._skew = (
+            1 + drift * random.choice((-1, 1)) * random.uniform(0.01, 0.02) for _ in range(3)
+        )
+        self._slip = 0.005 * drift
 
     @property
     def speed(self) -> float:
@@ -118,9 +123,9 @@ class Robot:
         slip = self._random.normal(0.0, 1.0, 3)
         self.odometry = _moved(
             *self.odometry,
-            self.vx * dt * self._way + 0.005 * math.sqrt(way) * slip[0],
-            self.vy * dt * self._skew + 0.005 * math.sqrt(way) * slip[1],
-            self.omega * dt * self._turns + 0.005 * (math.sqrt(way) + math.sqrt(turn)) * slip[2],
+            self.vx * dt * self._way + self._slip * math.sqrt(way) * slip[0],
+            self.vy * dt * self._skew + self._slip * math.sqrt(way) * slip[1],
+            self.omega * dt * self._turns + self._slip * (math.sqrt(way) + math.sqrt(turn)) * slip[2],
         )
 
 

@@ -13,7 +13,6 @@ from examples.fetch_delivery.world.arena import Arena
 ANGLES = np.radians(np.linspace(-135.0, 135.0, 271))
 ANGLES.setflags(write=False)
 MAX_RANGE_M = 30.0
-NOISE_M = 0.01
 
 
 def cast(arena: Arena, x: float, y: float, directions: Vector, discs: Vector) -> Vector:

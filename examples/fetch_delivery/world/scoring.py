@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 
@@ -40,6 +41,16 @@ class Score:
             if not any(since <= time <= when and said in (number, None) for time, said in self.reported):
                 silent.append((when, number))
         return silent
+
+    def mistaken(self) -> list[tuple[float, int | None]]:
+        """Return the reports of cubes that were delivered, before the report or after it."""
+        fetched, wrong = [time for time, _ in self.fetched], []
+        for when, number in self.reported:
+            since = max((time for time in fetched if time <= when), default=0.0)
+            until = min((time for time in fetched if time > when), default=math.inf)
+            if any(since <= time < until for time, _ in self.delivered):
+                wrong.append((when, number))
+        return wrong
 
     def __str__(self) -> str:
         """Say it in a line."""

@@ -27,9 +27,10 @@ from examples.fetch_delivery.world.faults import (
     UnreadableCube,
 )
 from examples.fetch_delivery.world.operators import Handover, Operator
-from examples.fetch_delivery.world.rendering import Cube, Renderer, Round
+from examples.fetch_delivery.world.rendering import EXPOSURE_S, Cube, Renderer, Round
 from examples.fetch_delivery.world.robots import RADIUS_M, Limits, Robot, collide
 from examples.fetch_delivery.world.scoring import Score
+from examples.fetch_delivery.world.surroundings import USUAL, Surroundings
 
 TICK_S = 0.05
 CRATE_M, CRATE_HEIGHT_M = 0.3, 0.6
@@ -62,6 +63,7 @@ class Simulation:
         faults: tuple[Fault, ...] = (),
         start_s: float = 1.0,
         cameras: Cameras = "light",
+        surroundings: Surroundings = USUAL,
     ) -> None:
         """Set everything up; equal arguments give equal worlds.
 
@@ -72,6 +74,7 @@ class Simulation:
           faults: what should go wrong.
           start_s: when the referee says "start".
           cameras: what draws the pictures: the light renderer, or MuJoCo, which needs a package and OpenGL.
+          surroundings: how large everything is, and how badly is measured.
 
         Raises:
           ValueError: if a value is out of its range.
@@ -86,9 +89,16 @@ class Simulation:
         cv2.setNumThreads(1)  # threads of its own would only fight with those of the graph
         lots = np.random.default_rng((seed, 0))
         self._seed, self._start_s, self._faults = seed, start_s, faults
-        self.arena = Arena(tuple(int(digit) for digit in lots.permutation(4) + 1))
+        self._surroundings = surroundings
+        digits = tuple(int(digit) for digit in lots.permutation(4) + 1)
+        self.arena = Arena(digits, radius=surroundings.radius, octagon=surroundings.octagon)
         self.robots = [
-            Robot(self._start(number, lots), limits or Limits(), np.random.default_rng((seed, 1, number)))
+            Robot(
+                self._start(number, lots),
+                limits or Limits(),
+                np.random.default_rng((seed, 1, number)),
+                surroundings.drift,
+            )
             for number in range(robots)
         ]
         self.scores = [Score() for _ in range(robots)]
@@ -96,7 +106,7 @@ class Simulation:
         self._cubes: list[Cube | None] = [None] * robots
         self._touched = [False] * robots
         self._ticks = 0
-        self.light = 1.0
+        self.light = surroundings.light
         self.blocked: Station | None = None
         self._renderer = _renderer(cameras, self.arena)
         self._check_faults()
@@ -195,7 +205,7 @@ class Simulation:
         discs = [(other.x, other.y, RADIUS_M) for other in self.robots if other is not body] + self.crates()
         table = np.array(discs).reshape(-1, 3)
         ranges = scanning.cast(self.arena, body.x, body.y, body.theta + scanning.ANGLES, table)
-        noise = self._chance(3, robot).normal(0.0, scanning.NOISE_M, len(ranges))
+        noise = self._chance(3, robot).normal(self._surroundings.offset, self._surroundings.noise, len(ranges))
         noisy: Vector = np.where(ranges < scanning.MAX_RANGE_M, np.maximum(ranges + noise, 0.0), ranges)
         return Scan(noisy, scanning.ANGLES, self.now_s, scanning.MAX_RANGE_M)
 
@@ -213,6 +223,7 @@ class Simulation:
             sideways=body.vy,
             shake=self._shake(4, robot),
             light=self.light,
+            exposure_s=EXPOSURE_S * self._surroundings.blur,
         )
 
     def basket_picture(self, robot: int) -> Picture:
@@ -266,7 +277,7 @@ class Simulation:
         if robot.lamp and self._is_left_alone(at):
             return
         unreadable = tuple(f.cube for f in self._faults if isinstance(f, UnreadableCube) and f.robot == number)
-        handover = operator.watch(self.now_s, robot.lamp, at, cube, self.arena, unreadable)
+        handover = operator.watch(self.now_s, robot.lamp, at, cube, self.arena, unreadable, self._surroundings.reach)
         if handover is not None:
             self._hand_over(number, handover)
 

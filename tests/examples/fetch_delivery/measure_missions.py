@@ -1,6 +1,7 @@
 """Runs missions one after another, held to what must be true while they run, and writes a table of how they went.
 
     python -m tests.examples.fetch_delivery.measure_missions --seeds 1-8 --robots 4 --minutes 10
+    python -m tests.examples.fetch_delivery.measure_missions --worlds random --robots 1
 
 A robot is stuck if it has neither got nor delivered a cube in the last two minutes. Speed is by processor time, of
 which one process uses one core: what else the machine does has an influence on it, by up to a half.
@@ -15,6 +16,7 @@ from typing import Annotated
 
 import typer
 
+from tests.examples.fetch_delivery import worlds
 from tests.examples.fetch_delivery.watching import Watch, watched
 
 STUCK_S = 120.0
@@ -24,10 +26,12 @@ STUCK_S = 120.0
 class Row:
     """How one run went; a number for each robot where there is one."""
 
+    world: str
     seed: int
     delivered: list[int]
     wrong: int
     returned: int
+    reported: int
     contact_s: list[float]
     stuck: list[int]
     pictures: int
@@ -40,22 +44,24 @@ class Row:
         contact = " ".join(f"{seconds:4.1f}" for seconds in self.contact_s)
         stuck = ", ".join(map(str, self.stuck)) or "none"
         return (
-            f"| {self.seed} | {delivered} | {self.wrong} | {self.returned} | {contact} | {stuck} | {self.pictures} "
-            f"| {1 / self.cost:.1f} | {len(self.found)} | {self.story} |"
+            f"| {self.world} | {self.seed} | {delivered} | {self.wrong} | {self.returned} | {self.reported} "
+            f"| {contact} | {stuck} | {self.pictures} | {1 / self.cost:.1f} | {len(self.found)} | {self.story} |"
         )
 
 
-def measured(seed: int, robots: int, minutes: float) -> Row:
+def measured(seed: int, robots: int, minutes: float, world: str = "usual") -> Row:
     began = time.process_time()
-    watch: Watch = watched(seed, robots, minutes=minutes)
+    watch: Watch = watched(seed, robots, minutes=minutes, surroundings=worlds.world(world))
     cost = (time.process_time() - began) / (60 * minutes)
     scores, now = watch.simulation.scores, watch.simulation.now_s
     last = [max((at for at, _ in score.fetched + score.delivered), default=0.0) for score in scores]
     return Row(
+        world,
         seed,
         [len(score.delivered) for score in scores],
         sum(len(score.wrong) for score in scores),
         sum(len(score.returned) for score in scores),
+        sum(len(score.reported) for score in scores),
         [score.contact_s for score in scores],
         [number for number, at in enumerate(last) if now - at > STUCK_S],
         watch.pictures,
@@ -77,20 +83,33 @@ def summary(rows: list[Row], minutes: float) -> str:
     )
 
 
+def missions(seeds: str, names: list[str]) -> list[tuple[int, str]]:
+    """Pair seeds and worlds: each world of several has the next seed, one world has all of them."""
+    first, _, last = seeds.partition("-")
+    numbers = range(int(first), int(last or first) + 1)
+    if len(names) == 1:
+        return [(seed, names[0]) for seed in numbers]
+    return [(numbers[index % len(numbers)], name) for index, name in enumerate(names)]
+
+
 def main(
     seeds: Annotated[str, typer.Option(help="One, or the first and the last.")] = "1-8",
     robots: Annotated[int, typer.Option(min=1, max=4)] = 4,
     minutes: Annotated[float, typer.Option(min=0.1)] = 10.0,
+    world_names: Annotated[
+        str, typer.Option("--worlds", help="Names with commas between them; named: all these; random: 20 drawn ones.")
+    ] = "usual",
 ) -> None:
     """Run missions and write a table."""
-    first, _, last = seeds.partition("-")
+    names = {"named": list(worlds.NAMED), "random": [f"random {number}" for number in range(worlds.RANDOM)]}
     print(f"{robots} robots, {minutes:g} minutes\n")
-    columns = "seed, delivered, wrong, returned, contact (s), stuck, pictures, times real time, not as it must, story"
+    columns = "world, seed, delivered, wrong, returned, reported, contact (s), stuck, pictures, times real time, "
+    columns += "not as it must, story"
     print("| " + columns.replace(", ", " | ") + " |")
     print("|" + "---|" * len(columns.split(", ")), flush=True)
     rows = []
-    for seed in range(int(first), int(last or first) + 1):
-        rows.append(measured(seed, robots, minutes))
+    for seed, name in missions(seeds, names.get(world_names, world_names.split(","))):
+        rows.append(measured(seed, robots, minutes, name))
         print(rows[-1], flush=True)
         for sentence in rows[-1].found[:5]:
             print(f"    {sentence}")

@@ -19,6 +19,7 @@ from examples.fetch_delivery.machine.mission import LIMITS, Orders, Senses
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
 from examples.fetch_delivery.mission import build
 from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, Station
+from examples.fetch_delivery.perception.shape import Shape
 from examples.fetch_delivery.world import Fault, fault
 from examples.fetch_delivery.world.scanning import ANGLES
 from hfg.nodes.robotics import Disk
@@ -29,7 +30,7 @@ SIGN = Sign(5.9, 0.65, math.pi, 0.05, 9.0)
 
 
 def at(x: float, y: float = 0.0, theta: float = 0.0, stamp: float = 0.0, sure: bool = True) -> Localised:
-    return Localised(np.array([x, y, theta]), np.eye(3) * 1e-4, 1.0, sure, stamp)
+    return Localised(np.array([x, y, theta]), np.eye(3) * 1e-4, 1.0, sure, stamp, Shape(6.0, 1.25))
 
 
 def scanned(distance: float = 2.0, stamp: float = 0.0) -> Scan:
@@ -48,6 +49,7 @@ def sense(now: float = 10.0, *, sure: bool = True, **known: Any) -> Senses:
 CHOSEN = ["done", "done", {}]
 READ = [*CHOSEN, "served"]
 UNKNOWN, KNOWN = [*READ, {"basket": 3}], [*READ, {"basket": 3, "signs": {3: SIGN}}]
+IN_VAIN = ["failed"] * 3
 VISIT = {"go_to": 0, "position": 1, "dock": 2, "settle": 3, "wait": 4, "leave": 5}
 WAYS: dict[str, list[Any]] = {
     "wait_for_start": [],
@@ -62,6 +64,7 @@ WAYS: dict[str, list[Any]] = {
     "explore/go_to": [*UNKNOWN, {}],
     **{f"deliver/visit/{step}": [*KNOWN, *["done"] * steps] for step, steps in VISIT.items()},
     "deliver/visit/retreat": [*KNOWN, "done", "lost"],
+    "deliver/confirm": [*KNOWN, *IN_VAIN],
 }
 
 
@@ -109,6 +112,7 @@ def test_the_ways_lead_to_all_states_and_each_but_the_first_has_a_limit() -> Non
         ("fetch/visit/leave", 6, "read_cube"),
         ("fetch/visit/retreat", 6, "fetch/select"),
         ("read_cube", 10, "fetch/select"),
+        ("deliver/confirm", 4, "fetch/select"),
         ("explore/view", 5, "explore/look_around"),
         ("explore/look_around", 15, "read_cube"),
         ("explore/go_to", 15, "read_cube"),
@@ -182,23 +186,35 @@ def test_a_cube_is_taken_to_its_station_three_times_then_the_sign_is_forgotten()
     for _ in range(2):
         assert led(mission, "failed")[0] == "deliver/visit/go_to"
     state, orders = led(mission, "failed")
-    assert (state, orders.forget, orders.report) == ("read_cube", 3, None)
+    assert (state, orders.ask) == ("deliver/confirm", True)
+    orders = mission.step(sense(basket=3))
+    assert (mission.state, orders.forget, orders.report) == ("read_cube", 3, None)
 
 
 def test_a_cube_that_was_brought_in_vain_twice_is_given_back_for_another_one() -> None:
     mission = in_state("deliver/visit/retreat")
     for _ in range(3):
         led(mission, "failed")
-    mission.step(sense(basket=3, signs={3: SIGN}))
+    for _ in range(2):
+        mission.step(sense(basket=3, signs={3: SIGN}))
     for _ in range(2):
         assert led(mission, "failed")[0] == "deliver/visit/go_to"
     state, orders = led(mission, "failed")
-    assert (state, orders.forget, orders.report) == ("fetch/select", 3, 3)
+    assert (state, orders.forget, orders.report) == ("deliver/confirm", None, None)
+    orders = mission.step(sense(basket=3))
+    assert (mission.state, orders.forget, orders.report) == ("fetch/select", 3, 3)
     mission.step(sense())
     for _ in range(4):
         mission.trigger("done")
     mission.step(sense(basket=3))
     assert mission.state == "fetch/visit/wait"
+
+
+def test_a_cube_that_was_taken_when_the_robot_had_given_up_is_not_reported() -> None:
+    mission = in_state("deliver/confirm")
+    orders = [mission.step(sense(now, basket=0)) for now in (11.0, 15.1)]
+    assert mission.state == "fetch/select"
+    assert [one.report for one in orders] == [None, None]
 
 
 def test_when_it_has_been_around_in_vain_it_gives_the_cube_back_for_another_one() -> None:
@@ -241,7 +257,7 @@ def test_position_ends_when_it_has_stood_right_twice_or_has_seen_nothing_for_lon
 
 def test_dock_stops_at_its_distance() -> None:
     assert Dock(speed=0.2).step(scanned(2.0)) == (Twist(0.2), None)
-    assert Dock().step(scanned(0.36)) == (Twist(), "done")
+    assert Dock().step(scanned(0.32)) == (Twist(), "done")
 
 
 def test_go_to_arrives_and_gives_up_when_it_comes_no_nearer() -> None:

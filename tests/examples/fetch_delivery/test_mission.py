@@ -20,11 +20,13 @@ from examples.fetch_delivery.mission.driving import MoveRobot, MoveToObstacle, P
 from examples.fetch_delivery.mission.errands import MapLookup, NextView, SelectFilling
 from examples.fetch_delivery.mission.visiting import Approach, SetLamp, WaitForCube
 from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, Station, Wall
-from examples.fetch_delivery.world import fault
+from examples.fetch_delivery.perception.shape import Shape
+from examples.fetch_delivery.world import Surroundings, fault
 from examples.fetch_delivery.world.scanning import ANGLES
 from examples.fetch_delivery.world.scoring import Score
 from hfg.nodes.robotics import Disk
 from hfg.testing import Recorder, fire
+from tests.examples.fetch_delivery import worlds
 from tests.examples.fetch_delivery.measure_missions import measured
 from tests.examples.fetch_delivery.watching import Watch, watched
 
@@ -32,7 +34,7 @@ pytestmark = pytest.mark.timeout(300)  # on a machine that has much else to do, 
 
 
 def at(x: float, y: float, theta: float = 0.0, stamp: float = 0.0, sure: bool = True) -> Localised:
-    return Localised(np.array([x, y, theta]), np.eye(3) * 1e-4, 1.0, sure, stamp)
+    return Localised(np.array([x, y, theta]), np.eye(3) * 1e-4, 1.0, sure, stamp, Shape(6.0, 1.25))
 
 
 def rolled(x: float, y: float = 0.0, theta: float = 0.0) -> Odometry:
@@ -383,6 +385,41 @@ def test_equal_seeds_give_equal_missions_in_another_process_with_another_hash_se
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, env=environment, cwd=root, capture_output=True, text=True, check=True)
     assert done.stdout.split() == [story(2)]
+
+
+# --- in arenas that it does not know
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(180)
+def test_a_robot_delivers_in_an_arena_of_another_size_and_in_other_light() -> None:
+    watch = watched(1, minutes=0.75, surroundings=Surroundings(radius=6.25, octagon=1.15, light=0.7, offset=-0.02))
+    (score,) = watch.simulation.scores
+    assert watch.found == []
+    assert score.delivered
+    assert watch.is_where_it_thinks()
+    shape = watch.localiser(0).survey.shape
+    assert abs(shape.radius - 6.25) < 0.05
+    assert abs(shape.octagon - 1.15) < 0.05
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("name", worlds.NAMED)
+def test_a_robot_delivers_for_ten_minutes_in_each_of_these_worlds(name: str) -> None:
+    row = measured(3, 1, minutes=10, world=name)
+    assert row.found == []
+    assert sum(row.delivered) >= 8
+    assert (row.wrong, row.stuck) == (0, [])
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(7200)
+def test_a_robot_delivers_eight_cubes_in_ten_minutes_on_average_over_worlds_drawn_by_lot() -> None:
+    rows = [measured(number, 1, minutes=10, world=f"random {number}") for number in range(worlds.RANDOM)]
+    assert [row.found for row in rows if row.found] == []
+    assert sum(row.wrong for row in rows) == 0
+    assert sum(sum(row.delivered) for row in rows) >= 8 * worlds.RANDOM
 
 
 # --- for minutes

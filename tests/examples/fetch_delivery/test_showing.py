@@ -21,6 +21,7 @@ import hfg
 from examples.fetch_delivery.__main__ import app
 from examples.fetch_delivery.mission import build
 from examples.fetch_delivery.perception.records import Localised, Sign
+from examples.fetch_delivery.perception.shape import Shape
 from examples.fetch_delivery.perception.sighting import find_targets, read_digits
 from examples.fetch_delivery.running import Result, carry_out
 from examples.fetch_delivery.showing import Showing, cameras, video
@@ -32,6 +33,7 @@ from examples.fetch_delivery.world import Simulation
 from hfg.base.token import Token
 from hfg.trace import ActivityChanged, TokenSent
 
+SHAPE = Shape(6.0, 1.25)
 ROOT = Path(__file__).parents[3]
 
 
@@ -217,7 +219,7 @@ def test_what_the_robot_believes_is_laid_into_the_arena_by_the_eighth_that_it_ha
     at = math.hypot(body.x, body.y), math.atan2(body.y, body.x) - math.pi / 2
     pose = np.array([at[0] * math.cos(at[1]), at[0] * math.sin(at[1]), turned])
     for number, sure in enumerate((False, True)):
-        localised = Localised(pose, np.eye(3), 1.0, sure, 0.0)
+        localised = Localised(pose, np.eye(3), 1.0, sure, 0.0, SHAPE)
         observer(TokenSent(0.0, "robot_0/perception/localise.localised -> robot_0/x.y", Token(localised, 0, 0.0)))
         observer.note_places()
         assert math.isnan(observer.robots[0].believed[number][0]) != sure
@@ -229,7 +231,7 @@ def test_the_view_from_above_shows_robots_lamps_and_the_map() -> None:
     observer = Observer(lambda: simulation, 4)
     simulation.set_lamp(2, True)
     seen = observer.robots[3]
-    seen.localised, seen.turn = Localised(np.zeros(3), np.eye(3), 1.0, True, 0.0), 0.0
+    seen.localised, seen.turn = Localised(np.zeros(3), np.eye(3), 1.0, True, 0.0, SHAPE), 0.0
     seen.signs = {4: Sign(0.0, 5.9, 0.0, 0.05, 3.0)}
     observer(ActivityChanged(0.0, "robot_3/fetch/visit/go_to/follow", True, "token"))
     view = TopView(simulation, 1)

@@ -184,3 +184,15 @@ def test_what_is_seen_twice_in_a_row_is_told_once() -> None:
     assert fire(node, image=shown[0]).events == []
     fire(node, slot="ask")
     assert [fire(node, image=shown[0]).events for _ in range(2)] == [[], [("none", None)]]
+
+
+def test_a_cube_that_lies_askew_for_a_moment_is_not_called_unreadable() -> None:
+    """Who has put it in askew sets it right; a smeared one stays unreadable, also when somebody asks meanwhile."""
+    smeared, right = (Renderer(Arena()).basket(Lying(2, smeared=one)) for one in (True, False))
+    node = cube.CubeWatch(times=2, doubtful=5)
+    told = [fire(node, image=image).events for image in (*[smeared] * 4, right, right)]
+    assert told == [[], [], [], [], [], [("number", 2)]]
+    told = [fire(node, image=smeared).events for _ in range(5)]
+    assert told == [[], [], [], [], [("unreadable", None)]]
+    fire(node, slot="ask")
+    assert [fire(node, image=smeared).events for _ in range(2)] == [[], [("unreadable", None)]]

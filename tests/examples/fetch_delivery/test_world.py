@@ -16,7 +16,7 @@ import pytest
 
 from examples.fetch_delivery import signs
 from examples.fetch_delivery.messages import Twist
-from examples.fetch_delivery.world import FAULTS, Arena, Simulation, fault, scanning
+from examples.fetch_delivery.world import FAULTS, USUAL, Arena, Simulation, Surroundings, fault, scanning
 from examples.fetch_delivery.world.operators import Operator
 from examples.fetch_delivery.world.rendering import FOCAL_PX, Renderer
 from examples.fetch_delivery.world.robots import Limits
@@ -197,6 +197,65 @@ def test_ranges_are_noisy_by_a_centimetre() -> None:
         errors.append(simulation.scan(0).ranges - truth)
     assert 0.009 < np.std(errors) < 0.011
     assert abs(np.mean(errors)) < 0.001
+
+
+# --- other arenas
+
+
+def test_an_arena_is_as_large_as_it_is_told_to_be() -> None:
+    simulation = Simulation(1, surroundings=Surroundings(radius=5.7, octagon=1.4, noise=0.0))
+    before(simulation, "filling", 0, 2.0)
+    assert simulation.scan(0).ranges[135] == pytest.approx(2.0, abs=1e-6)
+    assert math.hypot(simulation.robots[0].x, simulation.robots[0].y) == pytest.approx(3.4)
+    place(simulation, 3.0, 0.0, math.radians(360 / 64))
+    assert simulation.scan(0).ranges.max() < 2 * 5.7
+
+
+def test_a_laser_can_measure_too_far_and_noisily() -> None:
+    simulation = Simulation(5, surroundings=Surroundings(offset=0.03, noise=0.03))
+    robot = simulation.robots[0]
+    truth = scanning.cast(simulation.arena, robot.x, robot.y, robot.theta + scanning.ANGLES, np.empty((0, 3)))
+    errors = []
+    for _ in range(20):
+        simulation.step(0.1)
+        errors.append(simulation.scan(0).ranges - truth)
+    assert np.std(errors) == pytest.approx(0.03, abs=0.002)
+    assert np.mean(errors) == pytest.approx(0.03, abs=0.002)
+
+
+def test_odometry_can_drift_more() -> None:
+    off = []
+    for drift in (0.0, 1.0, 3.0):
+        simulation = Simulation(5, surroundings=Surroundings(drift=drift))
+        place(simulation, 3.0, -3.0, math.pi / 2)
+        drive(simulation, Twist(0.5), 8)
+        body = simulation.robots[0]
+        off.append(math.dist(body.odometry[:2], (body.y + 3.0, -(body.x - 3.0))))
+    assert off[0] < 1e-6
+    assert off[1] > 0.01
+    assert off[2] == pytest.approx(3 * off[1], rel=0.2)
+
+
+@pytest.mark.parametrize(("reach", "given"), [(USUAL.reach, 1), (0.4, 0)])
+def test_people_reach_only_so_far(reach: float, given: int) -> None:
+    simulation = Simulation(1, surroundings=Surroundings(reach=reach))
+    before(simulation, "filling", 1, 0.5)
+    simulation.set_lamp(0, True)
+    for _ in range(200):
+        simulation.step(0.1)
+    assert len(simulation.scores[0].fetched) == given
+
+
+def test_light_and_exposure_change_pictures() -> None:
+    usual, dim, blurred = (
+        Simulation(1, surroundings=one) for one in (USUAL, Surroundings(light=0.5), Surroundings(blur=4.0))
+    )
+    for simulation in (usual, dim, blurred):
+        before(simulation, "filling", 1, 2.0)
+        simulation.robots[0].omega = 1.0
+    assert dim.front_picture(0).mean() == pytest.approx(usual.front_picture(0).mean() / 2, rel=0.05)
+    sharp, soft = (np.abs(np.diff(one.front_picture(0).astype(int))).max() for one in (usual, blurred))
+    assert soft < sharp
 
 
 # --- the cameras

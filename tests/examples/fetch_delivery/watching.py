@@ -135,6 +135,8 @@ class Watch:
         for number, score in enumerate(self.simulation.scores):
             for when, cube in score.unaccounted():
                 self.found.append(f"robot_{number} has given cube {cube} back at {when} s and not said why")
+            for when, said in score.mistaken():
+                self.found.append(f"robot_{number} has reported cube {said} at {when} s, and delivered it")
             left = [cube for _, cube in score.delivered + score.wrong + score.returned]
             held = self.simulation.cube(number)
             if held is not None:
