@@ -60,13 +60,13 @@ def _camera(looks: int, in_threads: bool) -> hfg.Graph:
         photographs.photographs(looks=looks), group="camera" if in_threads else None, max_rate_hz=RATE_HZ
     )
     sight = graph.add(photographs.see(), deadline_s=DEADLINE_S)
-    for name, ksize, find in (("circles", 5, photographs.find_circles), ("lines", 3, photographs.find_lines)):
-        group = name if in_threads else None
-        smooth = graph.add(photographs.smooth(ksize=ksize), group=group)
-        found = graph.add(find(), group=group, deadline_s=DEADLINE_S)
+    for branch, ksize, find in (("circles", 5, photographs.find_circles), ("lines", 3, photographs.find_lines)):
+        home = branch if in_threads else None
+        smooth = graph.add(photographs.smooth(ksize=ksize), group=home)
+        found = graph.add(find(), group=home, deadline_s=DEADLINE_S)
         graph.connect(source.picture, smooth.src)
         graph.connect(smooth.out, found.picture)
-        graph.connect(found.out, sight.ports.inputs[name])
+        graph.connect(found.out, sight.ports.inputs[branch])
     for port in (source.ports.outputs["name"], source.picture):
         graph.connect(port, sight.ports.inputs[port.name])
     return graph

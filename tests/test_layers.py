@@ -56,6 +56,7 @@ FLOORS = {
     "hfg.monitors.compiling": 2,
     "hfg.monitors.properties": 2,
     "hfg.monitors.parsing": 2,
+    "hfg.monitors.margins": 2,
     "hfg.tuning": 6,
     "hfg.comparing": 7,
     "hfg.cli": 7,

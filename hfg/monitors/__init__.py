@@ -4,6 +4,7 @@ formulas     what is true at a point: activity, values, firings, and what was tr
 compiling    a formula as one function
 properties   patterns over formulas, and what judges them
 parsing      reads them from text
+margins      how far a run is from violating a property
 violations   what has shown that a property does not hold
 watching     lets them be judged in a run; needs the engine, so it is imported when it is used
 judging      judges each run of a graph by the monitors that the graph declares
@@ -31,6 +32,7 @@ from hfg.monitors.formulas import (
     since,
     throughout,
 )
+from hfg.monitors.margins import measured
 from hfg.monitors.parsing import parse
 from hfg.monitors.properties import Property, Verdict, always, eventually, leads_to, never, precedes, until
 
@@ -57,6 +59,7 @@ __all__ = [
     "eventually",
     "fired",
     "leads_to",
+    "measured",
     "never",
     "once",
     "parse",

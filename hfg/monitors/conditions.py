@@ -48,7 +48,7 @@ class Condition:
 def _holds(test: _Test, value: Any) -> bool:
     match test:
         case ("value", steps):
-            return bool(_part(value, steps))
+            return bool(part_of(value, steps))
         case ("&", one, other):
             return _holds(one, value) and _holds(other, value)
         case ("|", one, other):
@@ -56,10 +56,11 @@ def _holds(test: _Test, value: Any) -> bool:
         case ("~", one):
             return not _holds(one, value)
     sign, (_, steps), literal = test
-    return bool(_COMPARISONS[sign](_part(value, steps), literal))
+    return bool(_COMPARISONS[sign](part_of(value, steps), literal))
 
 
-def _part(value: Any, steps: tuple[str | int, ...]) -> Any:
+def part_of(value: Any, steps: tuple[str | int, ...]) -> Any:
+    """Return the field or element of a value that a condition names."""
     for step in steps:
         value = value[step] if isinstance(step, int) or isinstance(value, dict) else getattr(value, step)
     return value

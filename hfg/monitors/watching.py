@@ -18,6 +18,7 @@ from hfg.engine import Run
 from hfg.errors import GraphError, MonitorViolated, UsageError
 from hfg.graph.structure.naming import suggest
 from hfg.monitors.formulas import Active, Fired, Sent
+from hfg.monitors.margins import MarginJudge
 from hfg.monitors.properties import Judge, Property, Verdict
 from hfg.monitors.violations import Seen, Violation
 from hfg.trace import ActivityChanged, RunEnded, StructureChanged, TraceEvent
@@ -67,6 +68,12 @@ class Monitors:
     def properties(self) -> dict[str, Property]:
         """What is judged, by the name of its monitor."""
         return {name: one.what for name, one in self._watches.items()}
+
+    @property
+    def margins(self) -> dict[str, float]:
+        """How far the run is from violating each property that is `measured`, by the name of its monitor."""
+        judges = {name: one.judge for name, one in self._watches.items()}
+        return {name: judge.margin for name, judge in judges.items() if isinstance(judge, MarginJudge)}
 
     def check(self) -> None:
         """See that no property was violated; open ones are not.
