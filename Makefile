@@ -14,10 +14,11 @@ RESULTS := benchmarks/results
 PEERS   := .venv-peers
 
 .DEFAULT_GOAL := help
-.PHONY: help demo studio photographs test test-fast lint bench peers bench-peers bench-goals bench-docs bench-links bench-studio docs docs-nodes docs-drawings docs-mermaid docs-studio web test-web soak setup clean
+.PHONY: help demo follow studio photographs test test-fast lint bench peers bench-peers bench-goals bench-docs bench-links bench-studio docs docs-nodes docs-drawings docs-mermaid docs-studio web test-web soak setup clean
 
 help:
 	@echo "make demo    a robot fetches and delivers cubes; score, video and report in out/fetch_delivery, in less than 3 minutes"
+	@echo "make follow  a robot follows a person outdoors; report with map in out/follow_person, in a few minutes"
 	@echo "make studio  the delivery robot live in the studio: watch it in the browser, steer it, let things go wrong"
 	@echo "make photographs   search, measure and report on real photographs, watched and controlled"
 	@echo "make test    run all tests (without the long ones)"
@@ -38,6 +39,9 @@ help:
 # On a slow machine it ends earlier, and reports what there is by then.
 demo: $(READY)
 	$(BIN)/python -m examples.fetch_delivery --minutes 2 --within 120 --report out/fetch_delivery $(ARGS)
+
+follow: $(READY)
+	$(BIN)/python -m examples.follow_person --metres 300 --within 240 --report out/follow_person
 
 # In real time, until Ctrl-C. Without a browser it prints the address.
 studio: $(READY)
