@@ -217,7 +217,8 @@ def said_of(said: Said | None) -> str:
     if said is None:
         return "has no such token"
     modifier = f" ({said.activity:+d})" if said.activity else ""
-    return f"number {said.number}, stamp {said.stamp_s:.6f} s: {said.value}{modifier}"
+    stamp = "" if abs(said.stamp_s - said.sent_s) < _ROUNDED_S else f", stamp {said.stamp_s:.6f} s"
+    return f"number {said.number}, sent at {said.sent_s:.6f} s{stamp}: {said.value}{modifier}"
 
 
 def _of_counts(counts: Sequence[CountRow]) -> Iterator[str]:

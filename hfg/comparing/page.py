@@ -96,7 +96,8 @@ def _drawn(rows: Sequence[ActivityRow], duration_s: float) -> str:
     for tick in range(6):
         x = _LABEL + (_WIDTH - _LABEL - 10) * tick / 5
         parts.append(f'<path class="axis" d="M{x:.1f} {_AXIS - 4:g}V{height:g}" stroke-opacity=".4"/>')
-        parts.append(f'<text x="{x + 2:.1f}" y="11">{duration_s * tick / 5:.4g} s</text>')
+        anchor = ' text-anchor="end"' if tick == 5 else ""
+        parts.append(f'<text x="{x + 2:.1f}" y="11"{anchor}>{duration_s * tick / 5:.4g} s</text>')
     for index, row in enumerate(rows):
         y = _AXIS + index * _ROW
         kind = "" if row.differs_at_s is None else ' class="differs"'

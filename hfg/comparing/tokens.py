@@ -30,12 +30,14 @@ class Said(msgspec.Struct, frozen=True):
 
     Attributes:
       number: on its edge.
+      sent_s: when it was sent, in seconds of the run.
       stamp_s: in seconds of the run.
       activity: its modifier.
       value: as text.
     """
 
     number: int
+    sent_s: float
     stamp_s: float
     activity: int
     value: str
@@ -96,7 +98,7 @@ def compare_tokens(one: str, other: str) -> tuple[list[PortTokens], Difference |
         notes = [f'"{port}" was recorded on one side only' for port in sorted(_ports(a) ^ _ports(b))]
         exact = all(file.metadata.get("hfg", {}).get("clock") == "virtual" for file in (a, b))
         if not exact:
-            notes.append("one run was on the real clock, so stamps are not compared")
+            notes.append("times and stamps, because a run was on the real clock")
         found = _Comparing(ports, exact)
         notes += found.compare(a, b)
         first = found.first()
@@ -125,24 +127,24 @@ class _Comparing:
             one.a += 1
             count += 1
             if count <= _MOST_TOKENS:
-                self._keys[seen.port].append(self._key(a, seen))
+                self._keys[seen.port].append(self._key(seen, seen.at - began))
                 self._places[seen.port].extend((seen.at - began, seen.order))
         began = int(b.began() * 1e9)
         for seen in _tokens(b):
             one = self.ports.get(seen.port)
             if one is not None:
                 one.b += 1
-                self._take(b, one, seen, (seen.at - began, seen.order))
+                self._take(one, seen, (seen.at - began, seen.order))
         for one in self.ports.values():
             if one.differs_at is None and one.b < one.a:
                 self._differs(one, one.b + 1, None)
         return [f"only the first {_MOST_TOKENS:,} tokens are compared"] if count > _MOST_TOKENS else []
 
-    def _take(self, file: File, one: PortTokens, seen: _Seen, place: tuple[int, int]) -> None:
+    def _take(self, one: PortTokens, seen: _Seen, place: tuple[int, int]) -> None:
         if one.differs_at is not None:
             return
         keys = self._keys[one.port]
-        if one.b > one.a or (one.b <= len(keys) and keys[one.b - 1] != self._key(file, seen)):
+        if one.b > one.a or (one.b <= len(keys) and keys[one.b - 1] != self._key(seen, place[0])):
             self._differs(one, one.b, place)
 
     def _differs(self, one: PortTokens, turn: int, place: tuple[int, int] | None) -> None:
@@ -151,12 +153,12 @@ class _Comparing:
         of_a = [(places[2 * turn - 2], places[2 * turn - 1])] if 2 * turn <= len(places) else []
         self._differ_at[one.port] = min([*of_a, *([] if place is None else [place])], default=(0, 0))
 
-    def _key(self, file: File, seen: _Seen) -> int:
+    def _key(self, seen: _Seen, at: int) -> int:
         """Return a number that differs if the tokens do."""
         message = seen.message
         told = {name: value for name, value in message.items() if name not in _OF_TIME}
-        stamp = message.get("stamp") if self._exact else None
-        data = msgspec.json.encode((message.get("activity", 0), message.get("sequence", 0), stamp, told))
+        times = (message.get("stamp"), at) if self._exact else ()
+        data = msgspec.json.encode((message.get("activity", 0), message.get("sequence", 0), times, told))
         return int.from_bytes(blake2b(data, digest_size=8).digest())
 
     def first(self) -> PortTokens | None:
@@ -182,13 +184,13 @@ def _tokens(file: File) -> Iterator[_Seen]:
 
 def _said(file: File, port: str, turn: int) -> Said | None:
     """Read a token of a port once more."""
-    of_port = (seen.message for seen in _tokens(file) if seen.port == port)
-    message = next(islice(of_port, turn - 1, None), None)
-    if message is None:
+    seen = next(islice((seen for seen in _tokens(file) if seen.port == port), turn - 1, None), None)
+    if seen is None:
         return None
-    stamp = number_in(message.get("stamp")) - file.began()
+    message, began = seen.message, file.began()
     number = int(number_in(message.get("sequence"))) or turn  # a signal has one only on its edge
-    return Said(number, stamp, int(number_in(message.get("activity"))), _text(message))
+    activity = int(number_in(message.get("activity")))
+    return Said(number, seen.at / 1e9 - began, number_in(message.get("stamp")) - began, activity, _text(message))
 
 
 def _text(message: dict[str, Any]) -> str:

@@ -183,7 +183,7 @@ def test_compare_tells_what_differs_as_text_json_and_page(hfg: Command) -> None:
     shown = hfg(*both, "--report", "x.html")
     assert shown.code == 0, shown.err
     assert 'first difference: token 5 of "steps.out"' in shown.out
-    assert "number 5, stamp 0.800000 s: 4" in shown.out
+    assert "number 5, sent at 0.800000 s: 4" in shown.out
     assert "Who was active" in Path("x.html").read_text()
     found = told(hfg(*both, "--json"))
     assert found["first"]["port"] == "steps.out"

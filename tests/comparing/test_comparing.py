@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -82,6 +83,31 @@ def test_the_first_token_that_differs_is_named_with_edge_number_stamp_and_both_v
     assert first.b is not None
     assert (first.a.number, first.a.stamp_s, first.a.value) == (2, 0.1, "1")
     assert (first.b.number, first.b.stamp_s, first.b.value) == (2, 0.1, "100")
+
+
+def test_a_token_that_is_sent_at_another_time_differs(tmp_path: Path) -> None:
+    """Its value and its stamp are those of what it was made from, and equal."""
+
+    class Slow(hfg.Node):
+        seconds = hfg.Parameter(0.1)
+
+        async def process(self, number: int) -> int:
+            await asyncio.sleep(self.seconds)
+            return number
+
+    def slowed(seconds: float) -> hfg.Graph:
+        graph = hfg.Graph("slowed")
+        slow = graph.add(Slow(seconds=seconds), name="slow")
+        graph.connect(graph.add(numbers(count=1)).out, slow.ports.inputs["number"])
+        graph.connect(graph["slow.out"], graph.output("late", int))
+        return graph
+
+    first = compare(*run_both("ab", (lambda: slowed(0.1), lambda: slowed(0.2)), tmp_path)).first
+    assert first is not None
+    assert first.a is not None
+    assert first.b is not None
+    assert (first.port, first.a.value, first.a.stamp_s == first.b.stamp_s) == ("slow.out", first.b.value, True)
+    assert (first.a.sent_s, first.b.sent_s) == (0.1, 0.2)
 
 
 def test_a_side_that_sends_less_differs_where_it_ends(tmp_path: Path) -> None:
