@@ -1,4 +1,4 @@
-"""Nodes as text, to be pasted into this graph or another one, or sent to another user. Depends on commands."""
+"""Nodes as text, to be pasted into this graph or another one, or sent to another user. Depends on muting."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from hfg.graph import Graph
 from hfg.graph import commands as c
 from hfg.graph.structure.level import inside, level_of
 from hfg.graph.structure.paths import node_at
+from hfg.studio.muting import ways_among, ways_named
 from hfg.studio.refusing import Refused
 
 __all__ = ["pasted", "text_of_nodes"]
@@ -31,8 +32,9 @@ def text_of_nodes(graph: Graph, paths: Iterable[str]) -> str:
         node_at(level_of(graph), path)
     if len({path.rpartition("/")[0] for path in chosen}) > 1:
         raise Refused("usage", "nodes are copied from one level at a time")
-    kept = [one for one in graph.as_commands() if not isinstance(one, _LEFT_OUT) and _is_within(one, chosen)]
-    return c.encode(kept)
+    within = [one for one in graph.as_commands() if not isinstance(one, _LEFT_OUT) and _is_within(one, chosen)]
+    copied = (ways_among(one, lambda path: any(_node_of(path, node) for node in chosen)) for one in within)
+    return c.encode([one for one in copied if one is not None])
 
 
 def _is_within(command: c.Command, chosen: set[str]) -> bool:
@@ -78,10 +80,9 @@ def _tops(commands: Iterable[c.Command]) -> list[str]:
 
 
 def _moved(command: c.Command, names: Mapping[str, str]) -> c.Command:
-    changed = {}
-    for field in _PATHS:
-        said = getattr(command, field, None)
-        for old, new in names.items():
-            if isinstance(said, str) and _node_of(said, old):
-                changed[field] = new + said[len(old) :]
-    return msgspec.structs.replace(command, **changed)
+    def named(path: str) -> str:
+        return next((new + path[len(old) :] for old, new in names.items() if _node_of(path, old)), path)
+
+    said = {field: one for field in _PATHS if isinstance(one := getattr(command, field, None), str)}
+    moved = msgspec.structs.replace(command, **{field: named(path) for field, path in said.items()})
+    return ways_named(moved, named)

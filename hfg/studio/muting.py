@@ -5,7 +5,7 @@ Its edges are kept in its note, so that they come back after the graph was saved
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import msgspec
@@ -21,7 +21,7 @@ from hfg.nodetypes.node import Node
 from hfg.studio.refusing import Refused
 from hfg.types import why_not
 
-__all__ = ["muted"]
+__all__ = ["muted", "ways_among", "ways_named"]
 
 _NOTE: Final = "muted"
 
@@ -76,3 +76,31 @@ def _through(level: Level, node: Node, kept: list[dict[str, Any]]) -> list[c.Com
             again = {"do": "Connect", "source": f"{path}.{one['out']}", "target": one["to"], **one["options"]}
             commands += [c.Disconnect(one["from"], one["to"]), msgspec.convert(again, c.Connect)]
     return [*commands, c.Note(path, _NOTE)]
+
+
+def ways_among(command: c.Command, is_chosen: Callable[[str], bool]) -> c.Command | None:
+    """Keep of the note of a muted node the ways around it between chosen nodes; without any, take the note away."""
+    if (ways := _ways(command)) is None:
+        return command
+    kept = [way for way in ways if is_chosen(way["from"]) and is_chosen(way["to"])]
+    return msgspec.structs.replace(command, value=kept) if kept else None
+
+
+def ways_named(command: c.Command, named: Callable[[str], str]) -> c.Command:
+    """Let the note of a muted node follow the names of the nodes around it."""
+    if (ways := _ways(command)) is None:
+        return command
+    renamed = [way | {"from": named(way["from"]), "to": named(way["to"])} for way in ways]
+    return msgspec.structs.replace(command, value=renamed)
+
+
+def _ways(command: c.Command) -> list[dict[str, Any]] | None:
+    """Return the ways around a node that its note keeps; None if it is another note, or one that makes no sense."""
+    if not isinstance(command, c.Note) or command.name != _NOTE or not isinstance(command.value, list):
+        return None
+    is_own = all(isinstance(one, dict) and {"from", "to"} <= one.keys() for one in command.value)
+    return (
+        command.value
+        if is_own and all(isinstance(one[end], str) for one in command.value for end in ("from", "to"))
+        else None
+    )

@@ -13,7 +13,7 @@ from hfg.errors import ConnectionError as EdgeRefused
 from hfg.errors import GraphError
 from hfg.graph import Graph
 from hfg.graph.structure.connecting import refuse
-from hfg.graph.structure.edge import Edge, PortEnd, is_port, type_of
+from hfg.graph.structure.edge import Edge, PortEnd, end_path, is_port, type_of
 from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.options import PLAIN
 from hfg.graph.structure.paths import source_at, target_at
@@ -29,7 +29,9 @@ _ANY: Final = (Any, object)
 
 
 def targets(graph: Graph, port: str, moving: str = "") -> dict[str, Any]:
-    """Say of each port of the same level whether an edge may join it to this one.
+    """Say of each port of the same level whether an edge may join it to this one: once for all that are alike.
+
+    A reason has {port} for the name of the port, and {from} for where the edge comes from that it has.
 
     Args:
       graph: a whole graph.
@@ -41,15 +43,28 @@ def targets(graph: Graph, port: str, moving: str = "") -> dict[str, Any]:
     """
     fixed, begins, level = end_of(graph, port)
     moved = next((edge for edge in level.edges if edge.label == moving), None)
-    found: dict[str, dict[str, str]] = {}
+    found: dict[tuple[tuple[str, str], ...], list[str]] = {}  # hundreds of ports, few reasons
     for other in ends_of(level, sources=not begins):
         if _owner(other) is _owner(fixed) and other is fixed:
             continue
         source, target = (fixed, other) if begins else (other, fixed)
-        found[other.path] = _judged(level, source, target, moved)
-    fits = [one["fit"] for one in found.values()]
-    counts = {name: fits.count(name) for name in ("expects", "takes", "refused")}
-    return {"sends" if begins else "expects": _text(fixed), "counts": counts, "ports": found}
+        judged = _judged(level, source, target, moved)
+        found.setdefault(tuple((name, _of_any(said, level, other)) for name, said in judged.items()), []).append(
+            other.path
+        )
+    fits: list[dict[str, Any]] = [{**dict(judged), "ports": ports} for judged, ports in found.items()]
+    counts = {
+        name: sum(len(one["ports"]) for one in fits if one["fit"] == name) for name in ("expects", "takes", "refused")
+    }
+    return {"sends" if begins else "expects": _text(fixed), "counts": counts, "fits": fits}
+
+
+def _of_any(said: str, level: Level, port: PortEnd) -> str:
+    """Say it of any port: with {port} for its name, and {from} for where its edge comes from."""
+    before = level.connections.into.get(port)
+    if before is not None:
+        said = said.replace(f'"{end_path(before.source)}"', "{from}")
+    return said.replace(f'"{port.path}"', "{port}")
 
 
 def end_of(graph: Graph, path: str) -> tuple[PortEnd, bool, Level]:
@@ -82,8 +97,7 @@ def _judged(level: Level, source: PortEnd, target: PortEnd, moved: Edge | None) 
         if moved is None or in_the_way is not moved:
             level.connections.refuse_second(source, target)
     except EdgeRefused as error:
-        parts = parts_of(error)
-        return {"fit": "refused", "message": str(error), **{k: v for k, v in parts.items() if k != "path"}}
+        return {"fit": "refused", **{name: said for name, said in parts_of(error).items() if name != "path"}}
     return {"fit": fit_of(type_of(target)), "expected": describe(type_of(target))}
 
 

@@ -350,4 +350,5 @@ def test_what_is_shown_is_a_picture_or_lines_of_text() -> None:
     assert shapes("two words") == [("text", "two words")]
     assert shapes(3.5) == [("text", "3.5")]
     assert len(shapes(list(range(1000)))) == 10
+    assert shapes(np.zeros((4, 4, 5), np.uint8)) == [("text", "array of uint8, 4 x 4 x 5")]
     assert display.Show().newest(Looked(None)) is None

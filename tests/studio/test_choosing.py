@@ -61,6 +61,30 @@ def test_what_comes_to_a_muted_node_goes_around_it_until_it_takes_part_again(tmp
     live(main)
 
 
+@pytest.mark.rule("F10")
+def test_a_copy_of_a_muted_node_takes_part_again_without_touching_the_edges_of_the_first() -> None:
+    async def main() -> None:
+        page = Page(studio_of(graph := mission())).join()
+        await page.edit(*(await page.value("muted", path="scale"))["commands"])
+        around = edges_of(graph)
+
+        async def copy(*paths: str) -> None:
+            text = (await page.value("text", paths=paths))["text"]
+            assert (await page.edit(*(await page.value("paste", text=text))["commands"]))["t"] == "ack"
+
+        await copy("scale")
+        assert edges_of(graph) == around
+        alone = page.tables["nodes"]["scale_2"]
+        assert (alone["enabled"], "muted" in alone["notes"]) == (False, False)
+        await copy("numbers", "scale", "check")
+        into = "numbers_2.out -> scale_3.value"
+        assert edges_of(graph) == around | {into, "numbers_2.out -> check_2.value"}
+        await page.edit(*(await page.value("muted", path="scale_3"))["commands"])
+        assert edges_of(graph) == around | {into, "scale_3.out -> check_2.value"}
+
+    live(main)
+
+
 def test_a_node_without_inputs_that_its_followers_take_cannot_be_muted_and_says_so() -> None:
     async def main() -> None:
         page = Page(studio_of(mission())).join()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import Iterator
 from typing import Annotated, Any
 
@@ -310,6 +311,11 @@ def test_positions_that_users_gave_are_taken_away_by_arranging_in_one_step() -> 
 # --- targets ---
 
 
+def by_port(found: Any) -> dict[str, Any]:
+    """By port, how an edge fits."""
+    return {port: one for one in found["fits"] for port in one["ports"]}
+
+
 def test_each_port_says_before_the_drop_whether_an_edge_may_lead_there() -> None:
     async def main() -> None:
         graph = doubling()
@@ -318,13 +324,14 @@ def test_each_port_says_before_the_drop_whether_an_edge_may_lead_there() -> None
         page = Page(studio_of(graph)).join()
         found = await page.value("targets", port="source.out")
         assert found["sends"] == "int"
-        assert found["ports"]["free.value"]["fit"] == "expects"
-        assert found["ports"]["stop"]["fit"] == "takes"
-        refused = found["ports"]["words.value"]
+        said = by_port(found)
+        assert said["free.value"]["fit"] == "expects"
+        assert said["stop"]["fit"] == "takes"
+        refused = said["words.value"]
         assert (refused["expected"], refused["sent"]) == ("str", "int")
-        assert found["ports"]["scaled.value"]["fit"] == "refused"
+        assert said["scaled.value"]["fit"] == "refused"
         moving = await page.value("targets", port="source.out", moving="source.out -> scaled.value")
-        assert moving["ports"]["scaled.value"]["fit"] == "expects"
+        assert by_port(moving)["scaled.value"]["fit"] == "expects"
 
     live(main)
 
@@ -337,14 +344,17 @@ def test_what_is_said_of_a_target_is_what_happens_at_the_drop() -> None:
             graph.add(node, name=f"n{number}")
         page = Page(studio_of(graph)).join()
         for source in ("source.out", "scaled.out", "n3.out", "start"):
-            said = await page.value("targets", port=source)
-            for target, fit in said["ports"].items():
+            said = by_port(await page.value("targets", port=source))
+            edges = {edge.partition(" -> ")[2]: edge.partition(" -> ")[0] for edge in page.tables["edges"]}
+            for target, fit in said.items():
                 answer = await page.edit({"do": "Connect", "source": source, "target": target})
                 if answer["t"] == "ack":
                     assert fit["fit"] != "refused"
                     await page.ask("undo")
                 elif fit["fit"] == "refused":
-                    assert answer["message"].endswith(fit["message"])
+                    reason = fit["reason"].replace("{port}", f'"{target}"')
+                    assert reason.replace("{from}", f'"{edges.get(target)}"') in answer["message"]
+                    assert answer["message"].endswith(fit["remedy"])
                 else:  # only the whole shows it: a circle in which nothing could ever fire
                     assert answer["message"].startswith("the edit is refused because it would break the graph"), target
 
@@ -358,8 +368,26 @@ def test_a_wire_from_an_input_asks_where_it_may_come_from() -> None:
         page = Page(studio_of(graph)).join()
         found = await page.value("targets", port="free.value")
         assert found["expects"] == "int"
-        assert found["ports"]["source.out"]["fit"] == "expects"
-        assert "free.value" not in found["ports"]
+        assert by_port(found)["source.out"]["fit"] == "expects"
+        assert "free.value" not in by_port(found)
+
+    live(main)
+
+
+def test_what_is_said_of_the_targets_of_many_nodes_is_short() -> None:
+    async def main() -> None:
+        graph = hfg.Graph("many")
+        source = graph.add(numbers(), name="source")
+        before = source.out
+        for _ in range(500):
+            node = graph.add(scaled())
+            graph.connect(before, node.value)
+            before = node.out
+        page = Page(studio_of(graph)).join()
+        found = await page.value("targets", port="source.out")
+        assert len(by_port(found)) >= 500
+        assert len(found["fits"]) <= 6
+        assert len(json.dumps(found)) < 25 * len(by_port(found))
 
     live(main)
 

@@ -17,6 +17,9 @@ from hfg.types import accepts
 
 _LETTERS: Final = 44
 _LINES: Final = 10
+_SIZE: Final = 1.4  # of letters, of which the page makes none too small to read
+_LINE: Final = 1.8
+_FEW: Final = 12  # elements of an array that are shown
 
 
 class Show(Node):
@@ -41,12 +44,17 @@ class Show(Node):
             return None
         if accepts(value, AnyImage) and value.size:
             return _picture(value)
-        text = value if isinstance(value, str) else shown(value, _LETTERS * _LINES)
-        lines = textwrap.wrap(text, _LETTERS)[:_LINES] or [""]
-        scene = Scene(0, 0, _LETTERS, len(lines) + 1)
+        lines = textwrap.wrap(_words(value), _LETTERS)[:_LINES] or [""]
+        scene = Scene(0, 0, _LETTERS, _LINE * len(lines) + 1)
         for number, line in enumerate(lines):
-            scene.text(line, (1, len(lines) - number - 0.25), 0.8, anchor="start")
+            scene.text(line, (1, _LINE * (len(lines) - number - 0.5) + 0.5), _SIZE, anchor="start")
         return scene
+
+
+def _words(value: object) -> str:
+    if isinstance(value, np.ndarray) and value.size > _FEW:
+        return f"array of {value.dtype}, {' x '.join(map(str, value.shape))}"
+    return value if isinstance(value, str) else shown(value, _LETTERS * _LINES)
 
 
 def _picture(image: Any) -> Scene:

@@ -95,6 +95,7 @@ function Inner() {
       {layout?.view === "activity" && <ActivityLegend layout={layout} />}
       <Zoomer showAll={view.showAll} />
       {layout?.nodes.length === 0 && <NothingHere />}
+      {layout?.nodes.length === 1 && layout.lines.length === 0 && <p className="nothing-here first-node">Drag from a port to connect it. Drop the wire on nothing to choose what comes next.</p>}
     </Ground>
   );
 }

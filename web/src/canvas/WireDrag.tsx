@@ -1,8 +1,9 @@
 import { ViewportPortal } from "@xyflow/react";
-import type { Fit, Targets } from "../protocol/types";
+import type { Fit } from "../protocol/types";
 import { isSource } from "../state/actions";
 import { nameOf, nodeOf, portOf } from "../state/paths";
 import { useStudio } from "../state/studio";
+import { type Judged, reasonOf } from "../state/targets";
 import { Icon } from "../ui/Icon";
 import { loose } from "./geometry";
 import type { Spot } from "./wiring";
@@ -13,7 +14,7 @@ export function WireDrag({ spots }: { spots: Map<string, Spot> }) {
   if (!wire) return null;
   const from = spots.get(wire.from);
   const over = wire.over === null ? undefined : spots.get(wire.over);
-  const fit = wire.over === null ? undefined : wire.targets?.ports[wire.over];
+  const fit = wire.over === null ? undefined : wire.targets?.ports.get(wire.over);
   const start: [number, number] = from ? [from.x, from.y] : [wire.point.x, wire.point.y];
   const end: [number, number] = over ? [over.x, over.y] : [wire.point.x, wire.point.y];
   const upright = from?.kind === "event" || from?.kind === "slot" || from?.kind === "timeout";
@@ -29,15 +30,15 @@ export function WireDrag({ spots }: { spots: Map<string, Spot> }) {
           </svg>
         </div>
       </ViewportPortal>
-      <DragLine from={wire.from} targets={wire.targets} />
+      <DragLine from={wire.from} targets={wire.targets} free={wire.over === null} />
       {fit && wire.over !== null && (
-        <Reason port={wire.over} fit={fit} screen={wire.screen} active={wire.active} />
+        <Reason port={wire.over} from={wire.from} fit={fit} screen={wire.screen} active={wire.active} />
       )}
     </>
   );
 }
 
-function DragLine({ from, targets }: { from: string; targets: Targets | null }) {
+function DragLine({ from, targets, free }: { from: string; targets: Judged | null; free: boolean }) {
   const name = `${nameOf(nodeOf(from))}.${portOf(from)}`;
   if (!targets) {
     return (
@@ -58,11 +59,12 @@ function DragLine({ from, targets }: { from: string; targets: Targets | null }) 
       <span className="num muted">
         {takes} more take anything, {refused} refuse
       </span>
+      {free && <span className="muted">drop on nothing to add a node</span>}
     </div>
   );
 }
 
-function Reason({ port, fit, screen, active }: { port: string; fit: Fit; screen: { x: number; y: number }; active: boolean }) {
+function Reason({ port, from, fit, screen, active }: { port: string; from: string; fit: Fit; screen: { x: number; y: number }; active: boolean }) {
   const name = `${nameOf(nodeOf(port))}.${portOf(port)}`;
   const offset = document.getElementById("canvas")?.getBoundingClientRect() ?? new DOMRect();
   const style = { left: Math.max(8, screen.x - offset.x - 24), top: screen.y - offset.y + 24 };
@@ -73,8 +75,10 @@ function Reason({ port, fit, screen, active }: { port: string; fit: Fit; screen:
           <Icon name="no" />
           {name} does not take this
         </b>
-        <p>{fit.reason || fit.message}</p>
-        {fit.remedy !== "" && <p>{fit.remedy}</p>}
+        <p>
+          {fit.expected && fit.sent ? <Types from={from} fit={fit} /> : null}
+          {reasonOf(fit, port)}. {sentence(fit.remedy)}
+        </p>
         <p style={{ marginTop: 6, color: "var(--you)", fontWeight: 600 }}>Drop here to choose a node between them</p>
       </div>
     );
@@ -85,10 +89,21 @@ function Reason({ port, fit, screen, active }: { port: string; fit: Fit; screen:
         <Icon name="ok" />
         {name} takes {fit.sent || fit.expected || "this"}
       </b>
-      {fit.message !== "" && <p>{fit.message}</p>}
       <p className="muted" style={{ marginTop: 6 }}>
         <kbd>Alt</kbd> {active ? "it becomes active" : "make it active"} &nbsp; <kbd>Esc</kbd> leave it
       </p>
     </div>
   );
 }
+
+/** What one end expects, and what the other sends. */
+function Types({ from, fit }: { from: string; fit: Fit }) {
+  const [it, other] = isSource(from) ? ["expects", "sends"] : ["sends", "expects"];
+  return (
+    <>
+      It {it} <b>{it === "sends" ? fit.sent : fit.expected}</b>, {portOf(from)} {other} <b>{it === "sends" ? fit.expected : fit.sent}</b>:{" "}
+    </>
+  );
+}
+
+const sentence = (words: string): string => (words === "" ? "" : `${words[0]!.toUpperCase()}${words.slice(1)}.`);

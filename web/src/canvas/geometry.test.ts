@@ -1,6 +1,6 @@
 import type { LayoutRecord } from "../protocol/types";
 import { describe, expect, it } from "vitest";
-import { allInView, boundsOf, firstView, meets, middleOf, rounded, tipOf, zoomOf } from "./geometry";
+import { allInView, boundsOf, clearOf, firstView, meets, middleOf, rounded, tipOf, zoomOf } from "./geometry";
 
 describe("lines", () => {
   it("have rounded corners that are no larger than half of a side", () => {
@@ -38,6 +38,17 @@ describe("the first view of a level", () => {
     const { x, zoom } = allInView(boundsOf({ nodes, lines: [] }), 1076, 643);
     expect(-2000 * zoom + x).toBeCloseTo(24);
     expect(200 * zoom + x).toBeCloseTo(1076 - 24);
+  });
+  it("shows no node under the buttons or the legend", () => {
+    const [corner, middle] = [
+      [{ x: 0, y: 0, width: 200, height: 72 }, { x: 0, y: 1000, width: 200, height: 72 }],
+      [{ x: 0, y: 0, width: 2000, height: 72 }, { x: 900, y: 1000, width: 200, height: 72 }],
+    ] as LayoutRecord["nodes"][];
+    const wide = [{ points: [[0, 0], [2000, 0]] }] as unknown as LayoutRecord["lines"];
+    const { y, zoom } = clearOf(allInView, { nodes: corner!, lines: wide }, 1076, 643);
+    expect(1072 * zoom + y).toBeLessThan(643 - 52);
+    const all = clearOf(allInView, { nodes: middle!, lines: [] }, 1076, 643);
+    expect(all).toEqual(allInView(boundsOf({ nodes: middle!, lines: [] }), 1076, 643));
   });
   it("is far, middle or near", () => {
     expect([0.44, 0.45, 1.25, 1.26].map(zoomOf)).toEqual(["far", "middle", "middle", "near"]);

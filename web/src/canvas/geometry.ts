@@ -87,8 +87,14 @@ export function boundsOf({ nodes, lines }: Pick<LayoutRecord, "nodes" | "lines">
   return left === Infinity ? { x: 0, y: 0, width: 0, height: 0 } : { x: left, y: top, width: right - left, height: bottom - top };
 }
 
+export interface View {
+  x: number;
+  y: number;
+  zoom: number;
+}
+
 /** How a level is shown first: all of it if one can read it then, else its upper end at a size that one can read. */
-export function firstView(box: Box, canvasWidth: number, canvasHeight: number) {
+export function firstView(box: Box, canvasWidth: number, canvasHeight: number): View {
   const room = 48;
   const wide = (canvasWidth - room) / Math.max(1, box.width);
   const all = Math.min(wide, (canvasHeight - room) / Math.max(1, box.height));
@@ -97,7 +103,23 @@ export function firstView(box: Box, canvasWidth: number, canvasHeight: number) {
   return { x: (canvasWidth - box.width * zoom) / 2 - box.x * zoom, y: top - box.y * zoom, zoom };
 }
 
-export function allInView(box: Box, canvasWidth: number, canvasHeight: number) {
+export function allInView(box: Box, canvasWidth: number, canvasHeight: number): View {
   const zoom = Math.max(0.02, Math.min(1, (canvasWidth - 48) / Math.max(1, box.width), (canvasHeight - 48) / Math.max(1, box.height)));
   return { x: (canvasWidth - box.width * zoom) / 2 - box.x * zoom, y: (canvasHeight - box.height * zoom) / 2 - box.y * zoom, zoom };
+}
+
+/** How much of the lower edge of the canvas has buttons on its left and the legend on its right. */
+const STRIP = 52;
+const CORNER = 260;
+
+/** A view that shows all of a level, and no node of it under the buttons or the legend. */
+export function clearOf(choose: typeof allInView, layout: Pick<LayoutRecord, "nodes" | "lines">, width: number, height: number): View {
+  const box = boundsOf(layout);
+  const view = choose(box, width, height);
+  const hidden = layout.nodes.some((one) => {
+    const [left, right] = [one.x * view.zoom + view.x, (one.x + one.width) * view.zoom + view.x];
+    return (one.y + one.height) * view.zoom + view.y > height - STRIP && (left < CORNER || right > width - CORNER);
+  });
+  const isWhole = box.height * view.zoom <= height - 48;
+  return hidden && isWhole ? choose(box, width, height - STRIP) : view;
 }

@@ -1,7 +1,8 @@
-import type { LayoutRecord, Point, Targets } from "../protocol/types";
-import { edit, insertOn, question, toast } from "../state/actions";
+import type { LayoutRecord, Point } from "../protocol/types";
+import { edit, insertOn, toast } from "../state/actions";
 import { endsOf, nodeOf, portOf } from "../state/paths";
 import { change, studio } from "../state/studio";
+import { askTargets, type Judged, reasonOf } from "../state/targets";
 import type { HfgNode } from "./NodeView";
 import { keysOf } from "./Wires";
 
@@ -36,8 +37,8 @@ export function markEdgeUnder(edge: string | null): void {
 export async function insert(edge: string, path: string, place: [number, number]): Promise<void> {
   markEdgeUnder(null);
   const [source, target] = endsOf(edge);
-  const input = best(await question<Targets>("targets", { port: source, moving: edge }), path);
-  const output = best(await question<Targets>("targets", { port: target, moving: edge }), path);
+  const input = best(await askTargets(source, edge), path);
+  const output = best(await askTargets(target, edge), path);
   const refused = input.why || output.why;
   if (input.port === "" || output.port === "") {
     toast(refused || `${path} has no port that fits there.`, { kind: "warn" });
@@ -47,8 +48,9 @@ export async function insert(edge: string, path: string, place: [number, number]
   await insertOn(edge, path, portOf(input.port), portOf(output.port));
 }
 
-function best(targets: Targets, path: string): { port: string; why: string } {
-  const own = Object.entries(targets.ports).filter(([port]) => nodeOf(port) === path);
+function best(targets: Judged, path: string): { port: string; why: string } {
+  const own = [...targets.ports].filter(([port]) => nodeOf(port) === path);
   const found = own.find(([, fit]) => fit.fit === "expects") ?? own.find(([, fit]) => fit.fit === "takes");
-  return { port: found?.[0] ?? "", why: own[0]?.[1].message ?? "" };
+  const [first] = own;
+  return { port: found?.[0] ?? "", why: first && first[1].fit === "refused" ? reasonOf(first[1], first[0]) : "" };
 }

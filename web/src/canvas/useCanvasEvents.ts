@@ -93,6 +93,10 @@ export function useCanvasEvents(spots: Map<string, Spot>, layout: LayoutRecord |
       if (path) showTip(path, event.clientX, event.clientY);
       else hideTip();
     },
+    onPointerLeave() {
+      highlight(undefined);
+      hideTip();
+    },
   };
 }
 

@@ -3,7 +3,7 @@ import { type RefObject, startTransition, useCallback, useEffect, useMemo, useRe
 import { create } from "zustand";
 import type { LayoutRecord } from "../protocol/types";
 import { studio } from "../state/studio";
-import { allInView, type Box, boundsOf, firstView, type Zoom, zoomOf } from "./geometry";
+import { allInView, type Box, boundsOf, clearOf, firstView, type Zoom, zoomOf } from "./geometry";
 
 /** Which of the three ways to draw the zoom asks for. */
 export const useZoom = create<{ level: Zoom }>()(() => ({ level: "middle" }));
@@ -53,7 +53,7 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
     (how: "first" | "all", duration: number) => {
       const element = root.current;
       if (!element || !current.current) return;
-      const view = (how === "all" ? allInView : firstView)(boundsOf(current.current), element.clientWidth, element.clientHeight);
+      const view = clearOf(how === "all" ? allInView : firstView, current.current, element.clientWidth, element.clientHeight);
       chosen.current = how;
       own.current = view;
       void flow.setViewport(view, { duration });
@@ -138,7 +138,7 @@ export function useSight(layout: LayoutRecord): Box | null {
   return useMemo(() => {
     const { width, height } = flow.getState();
     if (whole === place || width === 0) return null;
-    const view = kept.get(place) ?? (layout.deep ? allInView : firstView)(boundsOf(layout), width, height);
+    const view = kept.get(place) ?? clearOf(layout.deep ? allInView : firstView, layout, width, height);
     return { x: -view.x / view.zoom, y: -view.y / view.zoom, width: width / view.zoom, height: height / view.zoom };
   }, [flow, layout, place, whole]);
 }

@@ -1,7 +1,8 @@
-import type { Fit, LayoutRecord, PortKind, Targets } from "../protocol/types";
-import { connect, disconnect, isSource, locked, question, reconnect, toast } from "../state/actions";
+import type { LayoutRecord, PortKind } from "../protocol/types";
+import { connect, disconnect, isSource, locked, reconnect, toast } from "../state/actions";
 import { edgeKey, endsOf, nodeOf } from "../state/paths";
 import { change, studio, type WireDrag } from "../state/studio";
+import { askTargets, type Judged } from "../state/targets";
 
 export interface Spot {
   path: string;
@@ -49,9 +50,9 @@ interface Known {
   moving: string;
   edges: unknown;
   until: number;
-  targets: Promise<Targets>;
+  targets: Promise<Judged>;
   /** Once they are here. */
-  answer: Targets | null;
+  answer: Judged | null;
 }
 
 /** What an edge from the port under the mouse may lead to. */
@@ -62,7 +63,7 @@ function targetsOf(from: string, moving: string): Known {
   const { edges } = studio().tables;
   const now = performance.now();
   if (known?.from === from && known.moving === moving && known.edges === edges && now < known.until) return known;
-  const one: Known = { from, moving, edges, until: now + KNOWN_MS, targets: question<Targets>("targets", { port: from, moving }), answer: null };
+  const one: Known = { from, moving, edges, until: now + KNOWN_MS, targets: askTargets(from, moving), answer: null };
   known = one;
   one.targets.then(
     (answer) => (one.answer = answer),
@@ -114,11 +115,11 @@ export async function beginWire(port: string, kind: string, at: { x: number; y: 
 }
 
 /** Marks go straight to the elements: hundreds of ports light up within a frame. */
-function light(targets: Targets, from: string): void {
+function light(targets: Judged, from: string): void {
   const takes = new Set<string>([nodeOf(from)]);
   for (const element of document.querySelectorAll<HTMLElement>("#canvas [data-port]")) {
     const path = element.dataset.port ?? "";
-    const fit = targets.ports[path]?.fit;
+    const fit = targets.ports.get(path)?.fit;
     element.classList.toggle("from", path === from);
     element.classList.toggle("expects", fit === "expects");
     element.classList.toggle("any", fit === "takes");
@@ -140,11 +141,8 @@ export function endWire(): void {
   unlight();
 }
 
-export const fitOf = (port: string | null): Fit | undefined =>
-  port === null ? undefined : studio().wire?.targets?.ports[port];
-
 /** What a wire may lead to; who drops it at once may be faster than the studio. */
-const answerFor = (wire: WireDrag): Promise<Targets | null> =>
+const answerFor = (wire: WireDrag): Promise<Judged | null> =>
   wire.targets ? Promise.resolve(wire.targets) : targetsOf(wire.from, wire.moving).targets.catch(() => null);
 
 /** Drop: connect, move, cut, or choose what lies between. */
@@ -157,7 +155,7 @@ export async function dropWire(place: { x: number; y: number }): Promise<void> {
     else openPalette(wire.from, wire.screen, place);
     return;
   }
-  const fit = (await answerFor(wire))?.ports[wire.over];
+  const fit = (await answerFor(wire))?.ports.get(wire.over);
   if (fit === undefined) return;
   if (fit.fit === "refused") {
     openPalette(wire.from, wire.screen, place);

@@ -71,7 +71,7 @@ export function Field({ id, type, value, locked, set, anew }: Props) {
       </div>
       {refusal !== "" && (
         <p className="par-note" role="alert">
-          {refusal} It stays at {short(value)}
+          {refusal}. It stays at {short(value)}
           {type.unit ? ` ${type.unit}` : ""}.
           {anew && <Anew act={() => void anew(refused).then(() => setRefusal(""))} />}
         </p>

@@ -3,7 +3,7 @@ import { activeInside, elapsed } from "../state/looking";
 import { parentOf } from "../state/paths";
 import { change, studio, useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
-import { unwrapped } from "../ui/paragraphs";
+import { plain, unwrapped } from "../ui/paragraphs";
 
 export function NodeHead({ path }: { path: string }) {
   const node = useStudio((s) => s.tables.nodes[path]);
@@ -35,7 +35,7 @@ export function NodeHead({ path }: { path: string }) {
         {[where, type?.title ?? node.title].filter(Boolean).join(" · ")}
         {!node.enabled && " · disabled"}
       </div>
-      {node.missing !== "" ? <p style={{ color: "var(--bad)" }}>{node.missing}</p> : <p>{type?.summary ?? ""}</p>}
+      {node.missing !== "" ? <p style={{ color: "var(--bad)" }}>{node.missing}</p> : <p>{plain(type?.summary ?? "")}</p>}
       {type && type.doc.length > type.summary.length + 1 && <Doc text={type.doc} />}
     </div>
   );
@@ -48,7 +48,7 @@ function Doc({ text }: { text: string }) {
         Description
       </summary>
       <p className="doc" style={{ whiteSpace: "pre-wrap" }}>
-        {unwrapped(text)}
+        {plain(unwrapped(text))}
       </p>
     </details>
   );

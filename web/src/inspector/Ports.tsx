@@ -27,10 +27,15 @@ function PortRow({ port }: { port: PortRecord }) {
   const speed = useRef<HTMLSpanElement>(null);
   const pinned = useStudio((s) => s.pins.includes(port.path));
   useEffect(() => {
+    let shown = false;
     const subscription = socket.subscribe("value", { path: port.path }, 4, (next) => {
       const one = next as Value | null;
       if (value.current) {
-        value.current.textContent = one === null || one.kind === "none" ? "" : one.kind === "marker" ? "silent" : one.summary;
+        const silent = one !== null && one.kind === "marker";
+        // What it sent before it fell silent is still of interest; it looks old.
+        if (!silent || !shown) value.current.textContent = one === null || one.kind === "none" ? "" : silent ? "silent" : one.summary;
+        shown ||= one !== null && one.kind !== "none" && !silent;
+        value.current.classList.toggle("muted", silent);
         value.current.title = value.current.textContent;
       }
       if (speed.current) speed.current.textContent = one !== null && one.seen > 0 ? rate(one.rate_hz) : "never";

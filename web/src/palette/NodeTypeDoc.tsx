@@ -1,7 +1,7 @@
 import { useEffect, useState } from "react";
 import type { FoundRow, TypeRecord } from "../protocol/types";
 import { question } from "../state/actions";
-import { unwrapped } from "../ui/paragraphs";
+import { plain, unwrapped } from "../ui/paragraphs";
 import { short } from "../ui/words";
 
 const known = new Map<string, TypeRecord>();
@@ -26,7 +26,7 @@ export function NodeTypeDoc({ row, port }: { row: FoundRow; port: string }) {
   return (
     <>
       <h4>{row.name || row.title}</h4>
-      <p>{row.summary}</p>
+      <p>{plain(row.summary)}</p>
       {type && (
         <>
           {(type.ports ?? []).filter((one) => one.kind !== "parameter").map((one) => (
@@ -51,7 +51,7 @@ export function NodeTypeDoc({ row, port }: { row: FoundRow; port: string }) {
               </div>
             ))}
           </dl>
-          {type.doc.length > type.summary.length + 1 && <p style={{ whiteSpace: "pre-wrap", marginTop: 8 }}>{unwrapped((type.doc.startsWith(type.summary) ? type.doc.slice(type.summary.length) : type.doc).trim())}</p>}
+          {type.doc.length > type.summary.length + 1 && <p style={{ whiteSpace: "pre-wrap", marginTop: 8 }}>{plain(unwrapped((type.doc.startsWith(type.summary) ? type.doc.slice(type.summary.length) : type.doc).trim()))}</p>}
           {type.example && (
             <>
               <h5>In code</h5>

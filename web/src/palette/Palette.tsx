@@ -4,6 +4,7 @@ import { addNode, question, toast } from "../state/actions";
 import { nameOf, nodeOf, portOf } from "../state/paths";
 import { change, type PaletteAt, useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
+import { plural } from "../ui/words";
 import { NodeTypeDoc } from "./NodeTypeDoc";
 import { Rows } from "./Rows";
 
@@ -141,7 +142,7 @@ function PaletteAtPlace({ at }: { at: PaletteAt }) {
           )}
           <span className="spring" />
           <span className="num">
-            {rows.length} of {found?.total ?? "…"} node types
+            {found && (rows.length < found.total ? `${rows.length} of ${found.total} node types` : plural(rows.length, "node type"))}
           </span>
         </div>
       </div>

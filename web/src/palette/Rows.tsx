@@ -1,5 +1,6 @@
 import { useEffect, useRef, useState } from "react";
 import type { Found, FoundRow } from "../protocol/types";
+import { plain } from "../ui/paragraphs";
 import { partsOf } from "./marking";
 
 interface Props {
@@ -57,7 +58,7 @@ export function Rows({ found, words, index, choose, add }: Props) {
           <b>
             <Marked text={row.name || row.title} words={words} />
           </b>
-          <div>{row.fit === "refused" ? row.message : <Marked text={row.summary} words={words} />}</div>
+          <div>{row.fit === "refused" ? row.message : <Marked text={plain(row.summary)} words={words} />}</div>
         </li>
       ))}
     </ul>

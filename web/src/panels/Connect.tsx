@@ -1,7 +1,8 @@
 import { type KeyboardEvent, useEffect, useState } from "react";
-import type { Command, Fit, Targets } from "../protocol/types";
+import type { Command, Fit } from "../protocol/types";
 import { connect, edit, isSource, question, toast } from "../state/actions";
 import { change, useStudio } from "../state/studio";
+import { askTargets, type Judged, reasonOf } from "../state/targets";
 
 interface Row {
   port: string;
@@ -21,21 +22,21 @@ export function Connect() {
   const path = useStudio((s) => [...s.selection][0] ?? "");
   const ports = useStudio((s) => s.tables.nodes[path]?.ports);
   const [from, setFrom] = useState("");
-  const [targets, setTargets] = useState<Targets | null>(null);
+  const [targets, setTargets] = useState<Judged | null>(null);
   const [out, setOut] = useState<WaysOut | null>(null);
   const [index, setIndex] = useState(0);
   useEffect(() => {
     if (from === "") return;
     question<WaysOut>("ways_out", { path: from }).then(setOut, () => undefined);
-    question<Targets>("targets", { port: from, moving: "" }).then(setTargets, (error: Error) => toast(error.message, { kind: "bad" }));
+    askTargets(from, "").then(setTargets, (error: Error) => toast(error.message, { kind: "bad" }));
   }, [from]);
   const rows: Row[] =
     from === ""
       ? (ports ?? []).map((port) => ({ port: port.path, says: `${port.kind} ${port.type}`, off: false }))
       : [
-          ...Object.entries(targets?.ports ?? {})
+          ...[...(targets?.ports ?? [])]
             .sort(([, a], [, b]) => ORDER.indexOf(a.fit) - ORDER.indexOf(b.fit))
-            .map(([port, fit]) => ({ port, says: says(fit), off: fit.fit === "refused" })),
+            .map(([port, fit]) => ({ port, says: says(fit, port), off: fit.fit === "refused" })),
           ...(out?.rows ?? []).map((row) => ({ port: row.port, says: "outside: the subgraph gets a port for it", off: false, commands: row.commands })),
           ...(out?.message ? [{ port: "Outside", says: out.message, off: true }] : []),
         ].sort((a, b) => Number(a.off) - Number(b.off));
@@ -85,7 +86,7 @@ export function Connect() {
 
 const ORDER: Fit["fit"][] = ["expects", "takes", "refused"];
 
-function says(fit: Fit): string {
-  if (fit.fit === "refused") return fit.message;
+function says(fit: Fit, port: string): string {
+  if (fit.fit === "refused") return `${reasonOf(fit, port)}; ${fit.remedy}`;
   return fit.fit === "expects" ? `expects ${fit.expected || "it"}` : "takes anything";
 }

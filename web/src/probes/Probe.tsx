@@ -5,7 +5,7 @@ import { saveValue } from "../state/capturing";
 import { socket } from "../state/link";
 import { valueSeen } from "../state/looking";
 import { nodeOf } from "../state/paths";
-import { useStudio } from "../state/studio";
+import { layoutKey, studio, useStudio } from "../state/studio";
 import { Icon } from "../ui/Icon";
 import { moment, rate, short } from "../ui/words";
 import { ImageView } from "./ImageView";
@@ -19,7 +19,7 @@ export function Probe({ path }: { path: string }) {
   const used = port?.used;
   useEffect(() => {
     setWhy("");
-    return socket.subscribe("value", { path }, 4, (next, time) => setValue(valueSeen(next, time)), setWhy).end;
+    return socket.subscribe("value", { path }, 4, (next, time) => setValue((before) => orBefore(valueSeen(next, time), before)), setWhy).end;
   }, [path, used]);
   const loose = port?.kind === "output" && !used;
   const shape = value?.shape ? ` · ${[...value.shape].join("×")}` : "";
@@ -39,13 +39,19 @@ export function Probe({ path }: { path: string }) {
   );
 }
 
+/** What was sent before a port fell silent stays to be seen, at its time. */
+const orBefore = (next: Value | null, before: Value | null): Value | null =>
+  next?.kind === "marker" && before !== null && before.kind !== "none" ? { ...before, rate_hz: next.rate_hz } : next;
+
 /** Nothing takes what this output sends, so nothing passes there that one could see. */
 function Loose({ path }: { path: string }) {
   const why = locked();
   const add = async () => {
     const found = await ask<{ commands: Command[] }>({ t: "ask", what: "shown_by", args: { path } });
-    if (!found || !(await edit(found.commands))) return;
+    if (!found) return;
     const added = found.commands.find((one) => one.do === "Add")?.path;
+    const beside = typeof added === "string" ? besideOf(nodeOf(path), added) : [];
+    if (!(await edit([...found.commands, ...beside]))) return;
     if (typeof added === "string") show(added);
   };
   return (
@@ -56,6 +62,15 @@ function Loose({ path }: { path: string }) {
       </button>
     </div>
   );
+}
+
+const APART = 64;
+
+/** Puts a new node to the right of one that a person has put in its place; the layout finds a place for all others. */
+function besideOf(node: string, added: string): Command[] {
+  const layout = studio().tables.layouts[layoutKey(studio())];
+  const box = layout?.nodes.find((one) => one.id === node);
+  return box && layout?.fixed.includes(node) ? [{ do: "Note", path: added, name: "position", value: [box.x + box.width + APART, box.y] }] : [];
 }
 
 /** The next value that passes, as a file. */

@@ -225,6 +225,8 @@ export interface LayoutRecord {
   lines: LayoutLine[];
   groups: string[];
   hidden: number;
+  /** Nodes that people have put in their places. */
+  fixed: string[];
   /** With what is inside of its subgraphs. */
   deep: boolean;
 }
@@ -354,16 +356,17 @@ export interface Fit {
   fit: "expects" | "takes" | "refused";
   expected: string;
   sent: string;
+  /** With {port} for the name of the port, and {from} for where the edge comes from that it has. */
   reason: string;
   remedy: string;
-  message: string;
 }
 
+/** What an edge may lead to: all ports of which the same is said together. */
 export interface Targets {
   sends?: string;
   expects?: string;
   counts: { expects: number; takes: number; refused: number };
-  ports: Record<string, Fit>;
+  fits: (Fit & { ports: string[] })[];
 }
 
 export interface FoundRow {

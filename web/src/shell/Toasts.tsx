@@ -1,3 +1,4 @@
+import { useLoad } from "../live/load";
 import { dropToast, holdToast } from "../state/actions";
 import { socket } from "../state/link";
 import { elapsed } from "../state/looking";
@@ -43,6 +44,8 @@ function OneToast({ toast }: { toast: Toast }) {
   );
 }
 
+const BUSY = 0.8;
+
 /** The page says what it does not know. */
 function Away() {
   const age = useStudio((s) => s.age);
@@ -51,6 +54,7 @@ function Away() {
   const why = useStudio((s) => s.closedWhy);
   const run = useStudio((s) => s.tables.studio.run);
   const offset = useStudio((s) => s.clockOffset);
+  const loop = useLoad((s) => s.load?.groups.loop?.busy_share ?? 0);
   if (phase === "refused") {
     return (
       <div className="pop toast bad" role="alert">
@@ -71,6 +75,7 @@ function Away() {
       </span>
       <span>
         <b>No word from the studio for {seconds} s.</b> {run ? `You see how it was at ${moment(Math.max(0, elapsed(run, offset) - seconds))}. ` : ""}Edits wait until it answers.
+        {run?.state === "running" && loop > BUSY && " The loop was busy: a node that computes for long holds up the studio, too. A thread of its own (in the inspector, group) helps."}
       </span>
       <button type="button" className="btn line" onClick={() => socket.connect()}>
         Try now

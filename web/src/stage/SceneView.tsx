@@ -48,7 +48,7 @@ export function SceneView({ view }: { view: OfferedView }) {
     <>
       <div className="drawn">
         <canvas ref={canvas} width={4} height={3} role="img" aria-label={`${view.title}: ${caption || "nothing yet"}`} data-view={view.key} />
-        {(why !== "" || !there) && <div className="says">{why || "Nothing to see before the graph runs."}</div>}
+        {(why !== "" || !there) && <div className="says">{why || (number > 0 ? "Nothing has arrived yet." : "Nothing to see before the graph runs.")}</div>}
       </div>
       <div className="caption num">{caption}</div>
     </>

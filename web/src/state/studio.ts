@@ -1,6 +1,7 @@
 import { create } from "zustand";
-import type { Hello, Tables, Targets } from "../protocol/types";
+import type { Hello, Tables } from "../protocol/types";
 import { EMPTY } from "./replica";
+import type { Judged } from "./targets";
 
 export type View = "activity" | "mission" | "all";
 export type Tab = "timeline" | "problems" | "log" | "history";
@@ -26,7 +27,7 @@ export interface PaletteAt {
 export interface WireDrag {
   from: string;
   moving: string;
-  targets: Targets | null;
+  targets: Judged | null;
   over: string | null;
   point: { x: number; y: number };
   screen: { x: number; y: number };

@@ -5,3 +5,6 @@ export function unwrapped(text: string): string {
     .map((part) => (/^( |\t|[-*>]|\d+\.)/m.test(part) ? part : part.replaceAll("\n", " ")))
     .join("\n\n");
 }
+
+/** Without the marks of code, which mean nothing here. */
+export const plain = (text: string): string => text.replaceAll("`", "");
