@@ -43,7 +43,12 @@ export function App() {
       <TopBar />
       <Rail />
       {start ? (
-        <StartPage />
+        <>
+          <StartPage />
+          <div className="over-start">
+            <Toasts />
+          </div>
+        </>
       ) : (
         <>
           {staged && hasViews && (

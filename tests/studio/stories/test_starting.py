@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import partial
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Locator, expect
@@ -76,3 +77,48 @@ def test_a_small_starter_runs_as_soon_as_it_is_chosen(first: Story) -> None:
     first.bench.state("running")
     first.bench.until(lambda: first.bench.is_active("drive"), "the signal has come")
     expect(first.node("drive")).to_be_visible()
+
+
+def test_a_file_that_cannot_be_opened_says_why_on_the_first_page(open_studio: Open, tmp_path: Path) -> None:
+    (tmp_path / "broken.hfg.yaml").write_text("hfg: 1\nnodes: [\n")
+    (tmp_path / "newer.hfg.yaml").write_text("hfg: 99\nname: newer\n")
+    story = open_studio(hfg.Graph("graph"))
+    for name, why in (("broken", "this is no YAML"), ("newer", "update hfg")):
+        story.page.get_by_role("button", name=f"{name}.hfg.yaml").click()
+        expect(story.page.locator(".toast").last).to_contain_text(why)
+
+
+MISSING = """hfg: 1
+name: missing
+nodes:
+  clock:
+    type: hfg.nodes.values:ListSource
+    parameters:
+      values: [1, 2]
+  finder:
+    type: hfg_blobs:BlobFinder
+    parameters:
+      sensitivity: 0.5
+  spare:
+    type: hfg.nodes.display:Show
+edges:
+  - clock.out -> finder.image
+"""
+
+
+def test_a_node_whose_type_is_not_installed_is_grey_and_saved_as_it_was(open_studio: Open, tmp_path: Path) -> None:
+    file = tmp_path / "missing.hfg.yaml"
+    file.write_text(MISSING)
+    story = open_studio(hfg.Graph("graph"))
+    story.page.get_by_role("button", name="missing.hfg.yaml").click()
+    expect(story.node("finder")).to_have_class(re.compile(r"\bmissing\b"))
+    expect(story.node("finder")).to_contain_text("not installed")
+    story.settle()
+    middles = [story.middle(story.node(name))[0] for name in ("clock", "finder")]
+    assert sum(middles) / 2 == pytest.approx(story.middle(story.page.locator("#canvas"))[0], abs=2)  # all is in view
+    story.select("spare")
+    story.press("Delete", "Control+s")
+    expect(story.page.locator(".filename")).to_have_text("missing.hfg.yaml")
+    story.bench.until(lambda: "spare" not in file.read_text(), "it is saved")
+    assert "hfg_blobs:BlobFinder" in file.read_text()
+    assert "sensitivity: 0.5" in file.read_text()

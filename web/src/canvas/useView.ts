@@ -17,6 +17,7 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
   const level = useZoom((s) => s.level);
   const [partly, setPartly] = useState(false);
   const shown = useRef<string | null>(null);
+  const seen = useRef(0);
   const settled = useRef(0);
   const current = useRef(layout);
   current.current = layout;
@@ -79,7 +80,12 @@ export function useView(root: RefObject<HTMLElement | null>, layout: LayoutRecor
 
   useEffect(() => {
     const element = root.current;
-    if (!layout || !element || shown.current === key(layout)) return;
+    if (!layout || !element) return;
+    const count = seen.current;
+    seen.current = layout.nodes.length;
+    // A graph that is opened may come after its name; a first node that is added stays where it was put.
+    const comes = count === 0 && layout.nodes.length > 1 && chosen.current !== null;
+    if (shown.current === key(layout) && !comes) return;
     shown.current = key(layout);
     const view = kept.get(key(layout));
     if (!view) {
