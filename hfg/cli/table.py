@@ -15,7 +15,8 @@ from typing import Final, NamedTuple
 
 from rich.cells import cell_len, set_cell_size
 
-from hfg.engine import Glance, NodeGlance
+from hfg.base.bars import bar
+from hfg.engine import Glance, MonitorGlance, NodeGlance
 
 _OVER_S: Final = 1.0
 _NARROWEST_PATH: Final = 10
@@ -29,6 +30,7 @@ class Row(NamedTuple):
     Attributes:
       rate_hz: firings and calls a second of the run's clock, over the last second.
       busy_share: of the machine's last second, for how much its code kept its group busy.
+      budget: the share of its deadline that the oldest data had used up when it was done; None without a deadline.
     """
 
     path: str
@@ -40,6 +42,7 @@ class Row(NamedTuple):
     errors: int
     doing: str
     fused: bool
+    budget: float | None = None
 
 
 class _Column(NamedTuple):
@@ -52,6 +55,7 @@ _COLUMNS: Final = (
     _Column("rate", 6, 9),
     _Column("busy", 5, 8),
     _Column("queue", 5, 6),
+    _Column("budget", 10, 5),
     _Column("active", 6, 7),
     _Column("fused", 5, 3),
     _Column("errors", 6, 5),
@@ -106,6 +110,7 @@ class View:
                     node.failed,
                     node.doing,
                     node.fused,
+                    node.oldest_s / node.deadline_s if node.deadline_s > 0 else None,
                 )
             )
         return rows
@@ -140,6 +145,9 @@ class View:
         if glance.growing:
             grown = (f"{label} to {capacity}" for label, capacity in glance.growing.items())
             lines.append(paint("queues of rings grow:  " + "  ".join(grown), _BOLD))
+        if glance.monitors:
+            broken = any(one.violations for one in glance.monitors)
+            lines.append(paint("monitors  " + "  ".join(map(_judged, glance.monitors)), _RED if broken else ""))
         active = [row.path for row in rows if row.active]
         if active:
             lines.append(paint("active  " + "  ".join(active), _GREEN))
@@ -167,6 +175,7 @@ def _body(shown: list[Row], rows: list[Row], paint: _Paint) -> list[str]:
     """The titles and a line for each row, in as many columns as there is room for."""
     longest = max(cell_len(row.path) for row in rows)
     absent = {"errors"} if not any(row.errors for row in rows) else set()
+    absent |= {"budget"} if all(row.budget is None for row in rows) else set()
     absent |= {"fused"} if not any(row.fused for row in rows) else set()
     columns = [column for column in _COLUMNS if column.title not in absent]
     while columns:
@@ -189,6 +198,7 @@ def _cells(row: Row) -> dict[str, str]:
         "rate": _number(row.rate_hz),
         "busy": _percent(row.busy_share),
         "queue": str(row.queued) if row.queued else "",
+        "budget": "" if row.budget is None else _budget(row.budget),
         "active": "yes" if row.active else "",
         "fused": "yes" if row.fused else "",
         "errors": str(row.errors) if row.errors else "",
@@ -215,6 +225,15 @@ def _number(value: float) -> str:
     if value >= 999.5:
         return f"{value / 1000:.1f}k" if value < 99_950 else f"{value / 1000:.0f}k"
     return f"{value:.0f}" if value >= 99.5 or value == 0 else f"{value:.1f}"
+
+
+def _budget(used: float) -> str:
+    return f"{bar(used, 4)} {_percent(min(used, 9.99))}"
+
+
+def _judged(monitor: MonitorGlance) -> str:
+    times = f" {monitor.violations} times" if monitor.violations > 1 else ""
+    return f"{monitor.name} {monitor.verdict}{times}"
 
 
 def _percent(share: float) -> str:

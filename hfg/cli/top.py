@@ -72,7 +72,7 @@ def _once(line: Line | RealmLine, json: bool) -> int:
     last = glances[-1]
     if json:
         head = {"graph": last.graph, "outcome": last.outcome, "duration_s": last.duration_s, "lost": last.lost}
-        head |= {"growing": last.growing}
+        head |= {"growing": last.growing, "monitors": last.monitors}
         show.json({**head, "nodes": [row._asdict() for row in view.rows()]})
     else:
         show.write("\n".join(view.lines(_PIPE_COLUMNS, len(last.nodes) + 10)) + "\n")

@@ -22,7 +22,7 @@ from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.face.run import Run
 from hfg.engine.face.running import run, run_async, running
 from hfg.engine.fusion.explaining import Explanation
-from hfg.engine.observing.glance import Glance, NodeGlance
+from hfg.engine.observing.glance import Glance, MonitorGlance, NodeGlance
 from hfg.engine.observing.report import EdgeReport, NodeReport, Report
 from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
 
@@ -32,6 +32,7 @@ __all__ = [
     "Explanation",
     "Glance",
     "GroupStatistics",
+    "MonitorGlance",
     "NodeGlance",
     "NodeReport",
     "NodeStatistics",

@@ -93,7 +93,11 @@ class Monitors:
 
     def _listen(self) -> None:
         vars(self._run).setdefault("_monitors", []).append(self)  # there they last as long as it does
+        self._engine.callbacks.glanced.append(self._glance)
         self._run.trace(self._changed, changes_only=True)
+
+    def _glance(self) -> list[tuple[str, str, int]]:
+        return [(name, one.judge.verdict.value, self.counts.get(name, 0)) for name, one in self._watches.items()]
 
     def _add(self, properties: Mapping[str, Property], on_violation: OnViolation) -> None:
         """Judge these, too, from now on; all of them, or none if one is refused."""

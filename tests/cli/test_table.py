@@ -7,7 +7,7 @@ import pytest
 from rich.cells import cell_len
 
 from hfg.cli.table import View
-from hfg.engine import Glance, NodeGlance
+from hfg.engine import Glance, MonitorGlance, NodeGlance
 
 
 def node(
@@ -86,6 +86,25 @@ def test_fused_nodes_have_a_mark_when_there_are_some() -> None:
         ["b", "0", "0", "%", "rate"],
     ]
     assert [row.fused for row in made.rows()] == [True, False]
+
+
+def test_monitors_have_a_line_with_what_is_known_of_each() -> None:
+    known = {"dark": ("violated", 3), "stops": ("not yet", 0), "once": ("violated", 1)}
+    found = [MonitorGlance(name, *rest) for name, rest in known.items()]
+    lines = view(msgspec.structs.replace(look(1.0, node("a")), monitors=found)).lines(80, 24)
+    assert lines[1] == "monitors  dark violated 3 times  stops not yet  once violated"
+
+
+def test_deadlines_have_a_bar_of_what_the_oldest_data_has_used_up() -> None:
+    oldest = {"a": 0.05, "b": 2.0}
+    late = [msgspec.structs.replace(node(name), deadline_s=0.1, oldest_s=seconds) for name, seconds in oldest.items()]
+    lines = view(look(1.0, *late, node("free"))).lines(80, 24)
+    assert [line.rstrip() for line in lines[2:]] == [
+        "node    rate   busy  queue      budget  active  now",
+        "a          0    0 %          ██░░ 50 %          rate",
+        "b          0    0 %         ████ 999 %          rate",
+        "free       0    0 %                             rate",
+    ]
 
 
 @pytest.mark.parametrize("columns", [1, 5, 20, 33, 47, 80, 200])

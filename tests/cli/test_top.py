@@ -53,6 +53,7 @@ def running(name: str = "ticking") -> Iterator[asyncio.AbstractEventLoop]:
     async def live() -> None:
         graph = hfg.Graph(name)
         graph.add(ticks(), max_rate_hz=50)
+        graph.monitor("rests", "never(active(ticks))")
         async with hfg.running(graph, watch=f"{name}.py"):
             loops.append(asyncio.get_running_loop())
             ends.append(asyncio.Event())
@@ -94,6 +95,7 @@ def test_json_has_the_same_numbers(command: Command) -> None:
     assert (told["graph"], told["outcome"]) == ("ticking", "running")
     (node,) = told["nodes"]
     assert (node["path"], node["group"], node["errors"]) == ("ticks", "loop", 0)
+    assert told["monitors"] == [["rests", "holds", 0]]
     assert {"rate_hz", "busy_share", "queued", "active", "doing"} <= set(node)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg import commands
 from hfg.engine.executing.groups import LoopGroup
 from hfg.engine.model.policies import EarliestDeadline, FairShare, Priority
 from hfg.errors import GraphError, RunError, UsageError
@@ -237,6 +238,52 @@ def test_a_deadline_counts_from_the_stamp_of_the_oldest_token() -> None:
     assert Busy.order == ["old", "new"]
 
 
+@hfg.node
+def onward(value: int) -> int:
+    return value
+
+
+def after_a_burst(**deadlines: Any) -> list[str]:
+    """Two ways of two nodes each, of which the first was connected first; which of their ends was first."""
+    Busy.order.clear()
+    graph = hfg.Graph()
+    graph.group("loop", policy="deadline")
+    source = graph.add(numbers(count=1))
+    for name in ("first", "second"):
+        middle, end = graph.add(onward(), name=f"to_{name}"), graph.add(Busy(cost_s=1.0), name=name)
+        graph.connect(source.out, middle.value)
+        graph.connect(middle.out, end.value, deadline_s=deadlines.get(name))
+    run(graph)
+    return list(Busy.order)
+
+
+@pytest.mark.rule("R2")
+def test_an_edge_has_a_deadline_too_and_what_leads_to_one_must_be_done_before_it() -> None:
+    assert after_a_burst() == ["first", "second"]
+    assert after_a_burst(second=0.5) == ["second", "first"]  # to_second has its deadline, to_first has none
+    assert after_a_burst(second=0.5, first=0.2) == ["first", "second"]
+
+
+@pytest.mark.rule("R2", "R4")
+def test_an_edit_of_a_running_graph_changes_deadlines() -> None:
+    async def main() -> list[str]:
+        Busy.order.clear()
+        graph = hfg.Graph()
+        graph.group("loop", policy="deadline")
+        values = graph.input("values", int)
+        for name in ("first", "second"):
+            graph.connect(values, graph.add(Busy(), name=name).value)
+        async with hfg.running(graph) as run, run.feed(values) as into:
+            await into.send(1)
+            gone = commands.Disconnect("values", "second.value")
+            await run.edit(gone, commands.Connect("values", "second.value", deadline_s=0.5))
+            await into.send(2)
+        return list(Busy.order)
+
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        assert runner.run(main()) == ["first", "second", "second", "first"]
+
+
 class _Token:
     def __init__(self, stamp: float) -> None:
         self.stamp = stamp
@@ -258,8 +305,7 @@ class _Waiting:
         def now() -> float:
             return 100.0
 
-    class options:  # noqa: N801
-        deadline_s = 1.0
+    due_s = 1.0
 
     def __init__(self, *, fireable: bool, calls_before: int = 0, calls: Any = None, live_inputs: Any = ()) -> None:
         self.fireable, self.calls_before, self.calls, self.live_inputs = fireable, calls_before, calls, live_inputs

@@ -568,8 +568,7 @@ class Run:
 
         The first call starts measuring times, as `statistics` does.
         """
-        _ = self._parts.measuring
-        return glance_at(self._engine)
+        return glance_at(self._engine, self._parts.measuring)
 
     def explain(self, node: Node | str | None = None) -> dict[str, Explanation]:
         """Explain how nodes do their work at this moment: fused, with which others, or why not and what to do.

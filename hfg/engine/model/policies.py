@@ -76,16 +76,15 @@ class Priority(_Ranked):
 
 
 class EarliestDeadline(_Ranked):
-    """The nearest deadline first; nodes without `deadline_s` come after all that have one.
+    """The nearest deadline first; nodes without one come after all that have one.
 
-    The deadline is the stamp of the oldest token that the firing or call will take, plus the node's `deadline_s`; a
-    source's is counted from now.
+    The deadline is the stamp of the oldest token that the firing or call will take, plus the node's `due_s`: its
+    `deadline_s`, or that of what it leads to (`graph.flat.deadlines`). A source's is counted from now.
     """
 
     def push(self, node: RunningNode) -> None:
         """See `Policy`."""
-        allowed = node.options.deadline_s if node.options is not None else None
-        self._insert(inf if allowed is None else _oldest_stamp(node) + allowed, node)
+        self._insert(inf if node.due_s is None else _oldest_stamp(node) + node.due_s, node)
 
 
 def _oldest_stamp(node: RunningNode) -> float:

@@ -123,6 +123,7 @@ class Vertex(Generic[NodeT]):
     push: Callable[[NodeT], None] = field(init=False)
     push_next: Callable[[NodeT], None] = field(init=False)
     priority: int = 0
+    due_s: float | None = None  # by when after its source it should be done; known where a policy asks for it
     own_enabled: bool = True  # regardless of the subgraphs around it
     active_for_s: float | None = None
     paced: bool = False  # a rate or a throttling gate may delay its firings

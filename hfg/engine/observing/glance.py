@@ -11,10 +11,10 @@ import time
 import msgspec
 
 from hfg.engine.fusion.explaining import is_fused
-from hfg.engine.observing.measuring import doing
+from hfg.engine.observing.measuring import Measuring, doing
 from hfg.engine.runtime.engine import Engine
 
-__all__ = ["Glance", "NodeGlance", "glance_at"]
+__all__ = ["Glance", "MonitorGlance", "NodeGlance", "glance_at"]
 
 
 class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
@@ -33,6 +33,8 @@ class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
       retries: how often a firing was tried again so far.
       age_s: how long ago its counts were taken, on the run's clock: a node of another process is as of its last report.
       fused: whether its firings are part of a region's waves (`Run.explain`).
+      deadline_s: how old its data may be when it is done with it; 0 if nothing is declared.
+      oldest_s: how old it was at most, since the first look.
     """
 
     path: str
@@ -47,6 +49,22 @@ class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
     retries: int = 0
     age_s: float = 0.0
     fused: bool = False
+    deadline_s: float = 0.0
+    oldest_s: float = 0.0
+
+
+class MonitorGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
+    """One monitor.
+
+    Attributes:
+      name: of the monitor.
+      verdict: "holds", "violated", "not yet" or "unknown".
+      violations: how often it was violated.
+    """
+
+    name: str
+    verdict: str
+    violations: int = 0
 
 
 class Glance(msgspec.Struct, frozen=True):
@@ -60,6 +78,7 @@ class Glance(msgspec.Struct, frozen=True):
       nodes: in order of adding, those inside iterating subgraphs too.
       lost: tokens that are gone with processes of groups (L2).
       growing: capacities by edge: queues that have grown to many times what was declared (F8).
+      monitors: what is known of each.
     """
 
     graph: str
@@ -69,11 +88,12 @@ class Glance(msgspec.Struct, frozen=True):
     nodes: list[NodeGlance]
     lost: int = 0
     growing: dict[str, int] = {}
+    monitors: list[MonitorGlance] = []
 
 
-def glance_at(engine: Engine) -> Glance:
-    """TokenTap at a run; to be called on its loop."""
-    nodes = []
+def glance_at(engine: Engine, measuring: Measuring) -> Glance:
+    """Look at a run; to be called on its loop."""
+    nodes, deadlines = [], measuring.deadlines
     engine.core.settle_counts()
     engine.core.settle_barriers()
     for worker in engine.core.workers:
@@ -93,6 +113,8 @@ def glance_at(engine: Engine) -> Glance:
                 worker.firings_under_way(),
                 worker.counts.retries,
                 fused=is_fused(worker),
+                deadline_s=deadlines.get(worker.path, 0.0),
+                oldest_s=0.0 if meter is None else meter.delays.longest,
             )
         )
     return Glance(
@@ -102,5 +124,6 @@ def glance_at(engine: Engine) -> Glance:
         machine_s=time.monotonic(),
         nodes=nodes,
         lost=sum(edge.lost for edge in engine.core.edges),
+        monitors=[MonitorGlance(*one) for monitors in engine.callbacks.glanced for one in monitors()],
         growing={edge.label: edge.capacity for edge in engine.core.overgrown if edge in engine.core.edges},
     )

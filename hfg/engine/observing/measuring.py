@@ -36,6 +36,8 @@ from hfg.engine.observing.report import edge_report, node_report
 from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
 from hfg.engine.runtime.callbacks import Edited
 from hfg.engine.runtime.engine import Engine
+from hfg.graph.flat import flatten
+from hfg.graph.flat.deadlines import deadlines
 from hfg.ports.edges import AnyEdge
 
 __all__ = ["Measuring", "doing"]
@@ -97,6 +99,7 @@ class Measuring:
         self._before: dict[Any, int] = {}
         self._timer: Any = None
         self._boxes: tuple[deque[Any], ...] = ()
+        self._deadlines: dict[str, float] | None = None
         self._mark_edges()
         self._before = self._marks
         for worker in self._workers():
@@ -125,8 +128,20 @@ class Measuring:
                 specialise(worker)
         return meter
 
+    @property
+    def deadlines(self) -> dict[str, float]:
+        """The earliest deadline that the graph declares for each node, by path."""
+        if self._deadlines is None:
+            self._deadlines = {
+                flat.nodes[index].path: seconds
+                for flat in flatten(self._engine.graph).walk()
+                for index, (seconds, _) in deadlines(flat).items()
+            }
+        return self._deadlines
+
     def _refit(self, edited: Edited) -> None:
         """These workers have other nodes now: from here on the code of those is measured."""
+        self._deadlines = None
         for worker in edited.workers:
             if worker.meter is not None:
                 worker.meter.refit()

@@ -6,7 +6,7 @@ They add what they want to be called. The engine knows none of them, and without
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 
 import msgspec
@@ -42,4 +42,6 @@ class Callbacks:
     rested: list[Callable[[], None]] = field(default_factory=list)  # the pump would run, but the run is paused
     finished: list[Callable[[], None]] = field(default_factory=list)  # the run is over; nothing is torn down yet
     edited: list[Callable[[Edited], None]] = field(default_factory=list)  # an edit has taken effect (R4)
+    # a glance: the name and verdict of each monitor, and how often it was violated
+    glanced: list[Callable[[], Iterable[tuple[str, str, int]]]] = field(default_factory=list)
     joined: list[Callable[[EventEdge], None]] = field(default_factory=list)  # an edge for outside signals was made

@@ -33,7 +33,7 @@ from hfg.engine.runtime.run_time import RunTime
 from hfg.engine.runtime.settings import Settings
 from hfg.errors import EngineInternalError, HfgError, NodeError, RunError, UsageError
 from hfg.graph import Graph
-from hfg.graph.flat import FlatGraph
+from hfg.graph.flat import FlatGraph, flatten
 from hfg.graph.graph import graph_of
 from hfg.nodetypes.node import Node
 from hfg.ports import EventPort
@@ -134,6 +134,9 @@ class Engine:
         self._instant_steps = 0
         self.beside_work = 0
         plan.build(self.core, flat, self.groups, loop=self._loop_group)
+        if "deadline" in (settings.policy, *(spec.policy for spec in flat.groups.values())):
+            plan.set_due_times(self.core, flat)
+            self.callbacks.edited.append(lambda _: plan.set_due_times(self.core, flatten(self.graph)))
 
     def _configure(self) -> None:
         """Pass the settings that decisions need to the core."""

@@ -11,6 +11,7 @@ from hfg.engine.rules.wiring import is_live, rewire
 from hfg.errors import GraphError, UsageError
 from hfg.graph.flat import LINK, End, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.graph.flat import Scope as FlatScope
+from hfg.graph.flat.deadlines import urgencies
 from hfg.graph.structure.places import edge_place, home_of, node_place
 from hfg.ports.edges import AnyEdge, BufferEdge, EventEdge, SyncEdge
 
@@ -68,6 +69,15 @@ def build(core: Core, flat: FlatGraph, groups: Mapping[str, Group], *, loop: Gro
         core.scopes.append(owner.scope)
     _derive(core, parts)
     core.sources.extend(worker for worker in leaves if worker.is_source)
+
+
+def set_due_times(core: Core, flat: FlatGraph) -> None:
+    """Set by when after their sources nodes should be done, for policy "deadline"."""
+    for worker in core.workers:
+        worker.due_s = None
+    for one in flat.walk():
+        for index, seconds in urgencies(one).items():
+            core.by_path[one.nodes[index].path].due_s = seconds
 
 
 def _derive(core: Core, parts: Sequence[_Part]) -> None:

@@ -352,17 +352,17 @@ class CutRun(Run):
         """See `Run.glance`; for other parts as of their last report (see `refresh`)."""
         self._ask_counts("glance")
         mine = super().glance()
-        nodes = {node.path: node for node in mine.nodes}
-        now = self.now()
+        nodes, growing = {node.path: node for node in mine.nodes}, dict(mine.growing)
+        lost, monitors, now = mine.lost, list(mine.monitors), self.now()
         for counts in self._counts.values():
-            age_s = max(now - counts.at, 0.0)
-            if counts.glance is not None:
-                nodes |= {node.path: msgspec.structs.replace(node, age_s=age_s) for node in counts.glance.nodes}
-        lost = mine.lost + sum(counts.glance.lost for counts in self._counts.values() if counts.glance is not None)
-        growing = dict(mine.growing)
-        for counts in self._counts.values():
-            growing |= counts.glance.growing if counts.glance is not None else {}
-        return msgspec.structs.replace(mine, nodes=list(self._in_order(nodes).values()), lost=lost, growing=growing)
+            if (told := counts.glance) is not None:
+                age_s = max(now - counts.at, 0.0)
+                nodes |= {node.path: msgspec.structs.replace(node, age_s=age_s) for node in told.nodes}
+                growing |= told.growing
+                lost += told.lost
+                monitors += told.monitors
+        in_order = list(self._in_order(nodes).values())
+        return msgspec.structs.replace(mine, nodes=in_order, lost=lost, growing=growing, monitors=monitors)
 
     def statistics(self) -> Statistics:
         """See `Run.statistics`; for other parts as of their last report (see `refresh`), with its age."""
