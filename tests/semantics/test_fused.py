@@ -50,6 +50,7 @@ FOUND = (  # by the soak
     20269223,
     30013297,
     50018949,
+    81003362,
 )
 ORDERS = 50  # of permitted moves, where several would do
 MOST_MOVES = 1500
@@ -170,23 +171,59 @@ def fusing_differs(calls: Calls, plan: GraphPlan, look: int = 0) -> str | None:
 def oracle_may_do(calls: Calls, plan: GraphPlan, ran: Ran) -> bool:
     """Whether some order of permitted moves makes the oracle call the same code with the same.
 
-    The order that R2 leaves open may decide what a node sees. The calls of the run say whose turn it was.
+    The order that R2 leaves open may decide what a node sees. The calls of the run say whose turn it was; where they do
+    not, chance decides. Each search repeats most of the choices that led furthest.
     """
     on_loop, aside = ran.calls
+    best: list[int] = []
     for seed in range(ORDERS):
         order = random.Random(seed)
-
-        def choose(moves: list[Move], order: random.Random = order) -> Move:
-            begun = sum(note[0] not in aside for note in calls)
-            wanted = [(path, _kind_of(what)) for path, what, *_ in on_loop[begun : begun + 1]]
-            return order.choice([move for move in moves if (move.node, move.kind) in wanted] or moves)
-
+        search = _Search(calls, on_loop, aside, best[: len(best) - int(order.expovariate(0.2))], order)
         calls.take()
         with contextlib.suppress(RuntimeError):
-            reference_run(plan.build(), choose=choose, max_moves=MOST_MOVES_OF_LARGE)
+            reference_run(plan.build(), choose=search.choose, max_moves=MOST_MOVES_OF_LARGE)
         if oracle_differs(plan, ran, calls.take()) is None:
             return True
+        best = max(best, search.made[: search.agreed], key=len)
     return False
+
+
+class _Search:
+    """Moves of the oracle that follow the calls of a run.
+
+    Attributes:
+      made: the index of each chosen move.
+      agreed: how many of them were made while all calls were those of the run.
+    """
+
+    def __init__(self, calls: Calls, on_loop: Any, aside: Any, kept: list[int], order: random.Random) -> None:
+        self._calls, self._on_loop, self._aside = calls, on_loop, aside
+        self._kept, self._order = kept, order
+        self._read = 0  # of the calls of the oracle
+        self._begun = 0  # of the calls of the run
+        self._agrees = True
+        self.made: list[int] = []
+        self.agreed = 0
+
+    def choose(self, moves: list[Move]) -> Move:
+        self._compare()
+        if len(self.made) < len(self._kept):
+            index = self._kept[len(self.made)]
+        else:
+            wanted = [(path, _kind_of(what)) for path, what, *_ in self._on_loop[self._begun : self._begun + 1]]
+            fitting = [number for number, move in enumerate(moves) if (move.node, move.kind) in wanted]
+            index = self._order.choice(fitting or range(len(moves)))
+        self.made.append(index)
+        return moves[index]
+
+    def _compare(self) -> None:
+        for path, what, *_ in self._calls[self._read :]:
+            self._read += 1
+            if path not in self._aside:
+                self._agrees &= (path, what) in [note[:2] for note in self._on_loop[self._begun : self._begun + 1]]
+                self._begun += 1
+        if self._agrees:
+            self.agreed = len(self.made)
 
 
 def _kind_of(what: str) -> str:
