@@ -27,7 +27,7 @@ from examples.fetch_delivery import judging, laws
 from examples.fetch_delivery.machine import driving as plain_driving
 from examples.fetch_delivery.machine import mission as machine_mission
 from examples.fetch_delivery.machine import robot as machine_robot
-from examples.fetch_delivery.mission import build, driving, errands, looking, robot, visiting
+from examples.fetch_delivery.mission import build, bundles, driving, errands, looking, robot, visiting
 from examples.fetch_delivery.perception import following, planning
 from hfg.graph.flat import ROOT, FlatEdge, flatten
 from hfg.tuning import Evaluation, Finished, mean_of, paired, sweep
@@ -101,7 +101,8 @@ def lines(sort: Sort) -> dict[str, int]:
         return {"how it drives": drives, "what it does when, and wiring": order + wiring}
     drives = code_lines(laws) + code_lines(driving, only=_LAWS) + code_lines(planning, only=["PlanPath"])
     drives += code_lines(following, only=["FollowPath", "Queue"])
-    order = code_lines(driving, without=_LAWS) + code_lines(looking) + code_lines(visiting) + code_lines(errands)
+    order = code_lines(driving, without=_LAWS) + code_lines(looking) + code_lines(bundles)
+    order += code_lines(visiting) + code_lines(errands)
     order += code_lines(robot, only=["Robot", "NumberWhen"])
     return {"how it drives": drives, "what it does when, and wiring": order}
 

@@ -12,10 +12,11 @@ import numpy as np
 from annotated_types import Ge, Gt
 
 import hfg
-from examples.fetch_delivery.messages import Odometry, Scan, Twist, Vector
+from examples.fetch_delivery.messages import Vector
+from examples.fetch_delivery.mission.bundles import AtStation, Driving, connect_errand
 from examples.fetch_delivery.mission.driving import GoTo, LookAround
 from examples.fetch_delivery.mission.looking import Shutter
-from examples.fetch_delivery.mission.visiting import AtStation, Visit
+from examples.fetch_delivery.mission.visiting import Visit
 from examples.fetch_delivery.perception.records import Localised, Sign, Station, wrapped
 from examples.fetch_delivery.perception.signs import delivery_station
 from hfg.nodes import activity
@@ -172,12 +173,7 @@ class DeliverCube(AtStation):
 
 def relay(graph: hfg.Graph, outer: AtStation, visit: Visit) -> None:
     """Lead data in and out of an errand's visit."""
-    for name in ("localised", "odometry", "scan", "others", "targets"):
-        graph.connect(outer.ports.inputs[name].inner, visit.ports.inputs[name])
-    for name in ("number", "none"):
-        graph.connect(outer.ports.slots[name].inner, visit.ports.slots[name])
-    for name in ("command", "lamp", "look", "look_into_basket"):
-        graph.connect(visit.ports.outputs[name], outer.ports.outputs[name].inner)
+    connect_errand(graph, visit, outer.inner_senses(), outer.inner_orders(), outer.inner_hands())
     graph.connect(visit.ask, outer.ask.inner)
 
 
@@ -252,25 +248,16 @@ class NextView(hfg.Node):
         self.views = 0
 
 
-class Explore(hfg.Subgraph):
+class Explore(Driving):
     """Drive on to the next view (paper, 6.1.2); what is seen on the way goes into the map of signs.
 
     Attributes:
-      localised: where the robot is.
-      odometry: what the wheels say.
-      scan: of the laser.
-      others: other robots.
-      command: velocities.
-      look: asks for a picture of what is ahead.
       begin: the number that is looked for; where activity arrives.
       found: something was found.
       done: it has driven on; look again into the map.
       gave_up: all was looked at.
     """
 
-    localised, odometry = hfg.Input(Localised), hfg.Input(Odometry)
-    scan, others = hfg.Input(Scan), hfg.Input(list[Disk])
-    command, look = hfg.Output(Twist), hfg.Output(bool)
     begin, found = hfg.slot(type=int), hfg.slot(type=object)
     done, gave_up = hfg.Event(object), hfg.Event(int)
 

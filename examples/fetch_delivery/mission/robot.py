@@ -16,6 +16,7 @@ from dataclasses import asdict
 
 import hfg
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
+from examples.fetch_delivery.mission.bundles import Hands, Orders, Senses, connect_errand, connect_step
 from examples.fetch_delivery.mission.driving import MoveRobot
 from examples.fetch_delivery.mission.errands import DeliverCube, Explore, FetchCube, MapLookup
 from examples.fetch_delivery.mission.looking import Shutter
@@ -201,48 +202,47 @@ class Robot(hfg.Subgraph):
             graph.connect(given_back, fetch.unwanted)
         for step in (wait_for_start, advance, read_cube):
             graph.gate(step, by=step)
-        self._feed(graph)
+        self._feed(graph, perception, advance, fetch, deliver, explore)
 
-    def _feed(self, graph: hfg.Graph) -> None:
+    def _feed(
+        self,
+        graph: hfg.Graph,
+        perception: Perception,
+        advance: MoveRobot,
+        fetch: FetchCube,
+        deliver: DeliverCube,
+        explore: Explore,
+    ) -> None:
         """Lead data to the mission, and commands from it."""
-        perception = graph["perception"]
-        for name in ("odometry", "scan", "front", "basket"):
-            graph.connect(self.ports.inputs[name].inner, perception.ports.inputs[name])
+        graph.connect(self.odometry.inner, perception.odometry)
+        graph.connect(self.scan.inner, perception.scan)
+        graph.connect(self.front.inner, perception.front)
+        graph.connect(self.basket.inner, perception.basket)
         # It turns to the middle and looks at it: so it knows which sides of the octagon are filling stations.
         shutter = graph.add(Shutter(n=4), name="look_first")
         graph.connect(self.scan.inner, shutter.tick)
         graph.connect(shutter.look, self.look_ahead.inner)
-        graph.gate(shutter, by=graph["advance"])
+        graph.gate(shutter, by=advance)
         basket = graph.add(Shutter(n=2), name="look_again")
         graph.connect(self.scan.inner, basket.tick)
         graph.connect(basket.look, self.look_into_basket.inner)
         graph.gate(basket, by=graph["read_cube"])
-        graph.connect(self.odometry.inner, graph["advance"].ports.inputs["odometry"])
+        graph.connect(self.odometry.inner, advance.odometry)
         # Of all that drive only the active one sends commands; whichever it is, others come first.
         give_way = graph.add(GiveWay(), name="give_way")
-        graph.connect(perception.ports.outputs["around"], give_way.around)
+        graph.connect(perception.around, give_way.around)
         graph.connect(give_way.held, self.command.inner)
-        graph.connect(graph["advance"].ports.outputs["command"], give_way.command)
-        for errand in (graph["fetch"], graph["deliver"]):
-            for name in ("odometry", "scan"):
-                graph.connect(self.ports.inputs[name].inner, errand.ports.inputs[name])
-            for name in ("localised", "others", "targets"):
-                graph.connect(perception.ports.outputs[name], errand.ports.inputs[name])
-            for name in ("number", "none"):
-                graph.connect(perception.ports.events[name], errand.ports.slots[name])
-            graph.connect(errand.ports.events["ask"], perception.ports.slots["ask"], overflow="latest")
-            graph.connect(errand.ports.outputs["command"], give_way.command)
-            graph.connect(errand.ports.outputs["lamp"], self.lamp.inner)
-            graph.connect(errand.ports.outputs["look"], self.look_ahead.inner)
-            graph.connect(errand.ports.outputs["look_into_basket"], self.look_into_basket.inner)
-        graph.connect(perception.ports.outputs["filling"], graph["fetch"].ports.slots["stations"])
-        explore = graph["explore"]
-        for name in ("odometry", "scan"):
-            graph.connect(self.ports.inputs[name].inner, explore.ports.inputs[name])
-        for name in ("localised", "others"):
-            graph.connect(perception.ports.outputs[name], explore.ports.inputs[name])
-        graph.connect(explore.ports.outputs["command"], give_way.command)
-        graph.connect(explore.ports.outputs["look"], self.look_ahead.inner)
+        graph.connect(advance.command, give_way.command)
+        senses = Senses(perception.localised, self.odometry.inner, self.scan.inner, perception.others)
+        orders = Orders(give_way.ports.slots["command"], self.look_ahead.inner)
+        hands = Hands(
+            perception.targets, perception.number, perception.none, self.lamp.inner, self.look_into_basket.inner
+        )
+        for errand in (fetch, deliver):
+            connect_errand(graph, errand, senses, orders, hands)
+            graph.connect(errand.ask, perception.ask, overflow="latest")
+        graph.connect(perception.filling, fetch.stations)
+        connect_step(graph, explore, senses, orders)
 
 
 def build(

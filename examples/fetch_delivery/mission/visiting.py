@@ -11,13 +11,13 @@ from __future__ import annotations
 from annotated_types import Gt
 
 import hfg
-from examples.fetch_delivery.messages import Odometry, Scan, Twist, Vector
+from examples.fetch_delivery.messages import Scan, Vector
+from examples.fetch_delivery.mission.bundles import AtStation
 from examples.fetch_delivery.mission.driving import GoTo, MoveRobot, MoveToObstacle, PositionToTarget
 from examples.fetch_delivery.mission.looking import Shutter
 from examples.fetch_delivery.perception.laser import smooth_scan, wall_ahead
-from examples.fetch_delivery.perception.records import Localised, Sighting, Station
+from examples.fetch_delivery.perception.records import Station
 from hfg.nodes import activity
-from hfg.nodes.robotics import Disk
 
 
 @hfg.node
@@ -124,33 +124,6 @@ class WaitForCube(hfg.Node):
         """See none."""
         if not self.loading:
             self.done.trigger(0)
-
-
-class AtStation(hfg.Subgraph):
-    """What every errand to a station needs, and what it gives.
-
-    Attributes:
-      localised: where the robot is.
-      odometry: what the wheels say.
-      scan: of the laser.
-      others: other robots.
-      targets: bull's-eyes that are seen.
-      number: a cube with this number lies in the basket.
-      none: no cube lies there.
-      command: velocities.
-      lamp: whether the lamp should be on.
-      look: asks for a picture of what is ahead.
-      look_into_basket: asks for one of the basket.
-      ask: asks the cube detection to look again.
-      done: a cube has changed hands.
-    """
-
-    localised, odometry, scan = hfg.Input(Localised), hfg.Input(Odometry), hfg.Input(Scan)
-    others, targets = hfg.Input(list[Disk]), hfg.Input(list[Sighting])
-    number, none = hfg.slot(type=int), hfg.slot(type=object)
-    command, lamp = hfg.Output(Twist), hfg.Output(bool)
-    look, look_into_basket = hfg.Output(bool), hfg.Output(bool)
-    ask, done = hfg.Event(), hfg.Event(object)
 
 
 class Visit(AtStation):
