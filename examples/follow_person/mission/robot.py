@@ -17,7 +17,11 @@ from examples.follow_person.mission.following import FollowPerson
 from examples.follow_person.mission.perceiving import Perception, SeePeople
 from examples.follow_person.mission.world import RATE_HZ, World
 from examples.follow_person.world import Conditions
+from hfg import monitors as m
 from hfg.nodes import driving, flow
+
+STEPS = ("person_detection", "object_tracking", "follow_fast", "follow_slow")
+"""The states of the mission (figure 24): it is in exactly one of them."""
 
 
 class Robot(hfg.Subgraph):
@@ -106,4 +110,17 @@ def build(seed: int = 1, *, metres: float = 1700.0, conditions: Conditions | Non
     graph.connect(world.photo, robot.photo, overflow="latest")
     graph.connect(robot.command, world.command)
     graph.connect(robot.look, world.look)
+    _demand(graph)
     return graph
+
+
+def _demand(graph: hfg.Graph) -> None:
+    """State what must hold of each run, which fails otherwise."""
+    steps = [m.active(f"robot/{step}") for step in STEPS]
+    somewhere, two = steps[0] | steps[1], steps[0] & steps[1]
+    for step in steps[2:]:
+        somewhere, two = somewhere | step, two | (somewhere & step)
+    drives = m.sent("robot.command", "value.vx > 0.01 | value.vx < -0.01")
+    graph.monitor("one_step", m.never(two), on_violation="fail")
+    graph.monitor("never_lost", m.leads_to(~somewhere, somewhere, within_s=0), on_violation="fail")
+    graph.monitor("chosen", m.precedes(m.sent("robot/person_detection.person"), drives), on_violation="fail")

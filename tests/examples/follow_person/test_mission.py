@@ -223,6 +223,16 @@ def test_the_graph_has_no_errors_and_no_warnings() -> None:
     assert [problem for problem in build().check() if problem.severity != "hint"] == []
 
 
+@pytest.mark.rule("A5")
+def test_a_mission_in_two_steps_at_once_fails_and_says_how_that_came() -> None:
+    graph = build(metres=1.0)
+    graph.start.activates(graph["robot/object_tracking"].begin)
+    result = carry_out(graph)
+    assert result.outcome == "failed"
+    assert result.error.startswith('monitor "one_step" is violated after 0 s: ')
+    assert "0 s  robot/object_tracking  True" in result.error
+
+
 @pytest.mark.slow
 def test_the_robot_follows_the_person_who_was_chosen_at_the_start() -> None:
     result = followed("open", 25.0)
