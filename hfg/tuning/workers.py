@@ -32,6 +32,7 @@ _WITH_PARENT: Final = 1  # PR_SET_PDEATHSIG of Linux
 _DONE, _DIED, _LATE = b"d", b"x", b"l"
 _PIECE: Final = 1 << 16
 _FORKING: Final = threading.Lock()
+"""Held while a pipe is made and a process forked, so that no other process gets the end that is written to."""
 
 
 class Died(HfgError):
@@ -123,9 +124,10 @@ class Workers:
                 idle.append(link)
 
     def _fork(self) -> None:
-        here, there = Pipe()
         program = os.getpid()
-        pid = _fork()
+        with _FORKING:
+            here, there = Pipe()
+            pid = _fork()
         if pid == 0:
             try:
                 here.close()
@@ -158,7 +160,7 @@ def _need_fork() -> None:
 
 
 def _fork() -> int:
-    with _FORKING, warnings.catch_warnings(), _one_thread_of_opencv():
+    with warnings.catch_warnings(), _one_thread_of_opencv():
         warnings.simplefilter("ignore", DeprecationWarning)  # threads: the fork uses none of their locks
         return os.fork()
 
@@ -238,9 +240,12 @@ def _carried_out(
     work: Callable[[bytes], bytes], task: bytes, patience_s: float | None, leave: Callable[[int], None]
 ) -> bytes:
     """Fork a process, let it leave this one, whose number it gets, and do the work in it."""
-    reader, writer = os.pipe()
     parent = os.getpid()
-    pid = _fork()
+    with _FORKING:
+        reader, writer = os.pipe()
+        pid = _fork()
+        if pid:
+            os.close(writer)
     if pid == 0:
         code = 1
         try:
@@ -252,7 +257,6 @@ def _carried_out(
             _write(writer, _DIED + traceback.format_exc().strip().rpartition("\n")[2].encode())
         finally:
             os._exit(code)
-    os.close(writer)
     said, late = _read(reader, patience_s)
     os.close(reader)
     if late:

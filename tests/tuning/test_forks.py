@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
@@ -165,6 +166,26 @@ def test_a_search_works_inside_a_running_loop_and_beside_it() -> None:
 
     first, second = asyncio.run(main())
     assert first == second < 1
+
+
+def test_processes_of_several_threads_do_not_wait_for_each_other() -> None:
+    """A process that had the other's end of a pipe would keep it open until it ends itself."""
+    reader, writer = os.pipe()
+
+    def waits(_: bytes) -> bytes:
+        return os.read(reader, 1)
+
+    def quick(_: bytes) -> bytes:
+        return b"done"
+
+    with ThreadPoolExecutor() as pool:
+        slow = pool.submit(in_process, waits, b"")
+        answers = [one.result(timeout=patience(20)) for one in [pool.submit(in_process, quick, b"") for _ in range(12)]]
+        os.write(writer, b"x")
+        assert slow.result() == b"x"
+    assert answers == [b"done"] * 12
+    os.close(reader)
+    os.close(writer)
 
 
 def test_a_search_works_in_a_node_of_a_graph_that_runs() -> None:
