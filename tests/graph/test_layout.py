@@ -13,6 +13,7 @@ import pytest
 
 import hfg
 from examples import fetch
+from examples.fetch_delivery.mission import build as two_robots
 from examples.fetch_delivery.mission import robot
 from examples.figures import robot as robot_figures
 from hfg.graph.drawing import Layout, Line, NodeBox, View, lay_out
@@ -295,6 +296,14 @@ def test_a_subgraph_is_a_box_around_what_lies_in_it_at_any_depth() -> None:
             assert around.y < one.y
             assert one.x + one.width < around.x + around.width
             assert one.y + one.height < around.y + around.height
+
+
+def test_open_subgraphs_stand_side_by_side_rather_than_become_too_high() -> None:
+    drawn = lay_out(two_robots(robots=2))
+    first, second = named(drawn, "robot_0"), named(drawn, "robot_1")
+    assert first.y == second.y
+    assert first.x + first.width <= second.x
+    assert drawn.height < drawn.width < 3 * drawn.height
 
 
 def test_a_folded_subgraph_says_how_many_nodes_are_inside() -> None:

@@ -51,7 +51,7 @@ def as_layers(things: Sequence[Thing], ways: Sequence[Link], first_row: int) -> 
             continue
         own = {one.number for one in part}
         inner = [link for link in ways if link.tail is not None and link.tail.number in own]
-        columns = layers(part, inner)
+        columns = _abreast(part, layers(part, inner))
         for thing in part:
             thing.lane = columns[thing.number]
         _order_rows(part, inner)
@@ -62,6 +62,21 @@ def as_layers(things: Sequence[Thing], ways: Sequence[Link], first_row: int) -> 
     wide = max(1, round((len(alone) * _BROAD * 56.0 / 150.0) ** 0.5), max((one.lane + 1 for one in things), default=1))
     for number, thing in enumerate(alone):
         thing.lane, thing.row = number % wide, row + number // wide
+
+
+def _abreast(things: Sequence[Thing], columns: dict[int, int]) -> dict[int, int]:
+    """Let open subgraphs of one column stand side by side where one below the other would be too high."""
+    found: dict[int, int] = {}
+    shift = 0
+    for column in sorted(set(columns.values())):
+        boxes = [one for one in things if columns[one.number] == column and one.shape.look == "box"]
+        wide, high = (max((getattr(one, of) for one in boxes), default=0.0) for of in ("width", "height"))
+        counts = range(1, len(boxes) + 1)
+        count = min(counts, key=lambda n: max(n * wide / _BROAD, -(-len(boxes) // n) * high), default=1)
+        found |= {number: at + shift for number, at in columns.items() if at == column}
+        found |= {one.number: column + shift + index % count for index, one in enumerate(boxes)}
+        shift += count - 1
+    return found
 
 
 def _parts(things: Sequence[Thing], ways: Sequence[Link]) -> list[list[Thing]]:
