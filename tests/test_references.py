@@ -42,6 +42,7 @@ INVENTED = {
     "filters.py",
     "halves.py",
     "hill.py",
+    "map.svg",
     "note.txt",
     "steps.py",
     "ways.svg",
