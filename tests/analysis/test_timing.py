@@ -251,6 +251,23 @@ def test_durations_that_cannot_be_are_refused(durations: Any, sentence: str) -> 
         analyse_time(graph, durations)
 
 
+class Box(hfg.Subgraph):
+    number = hfg.Input(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        graph.connect(self.number.inner, graph.add(step(), name="inner", takes_s=0.01).number, deadline_s=0.05)
+
+
+@pytest.mark.rule("G1")
+@pytest.mark.parametrize(("outer_s", "least_s"), [(None, 0.05), (0.03, 0.03), (0.2, 0.05)])
+def test_an_edge_into_a_subgraph_has_the_least_deadline_of_its_parts(outer_s: float | None, least_s: float) -> None:
+    graph = hfg.Graph()
+    camera = graph.add(tick(), name="camera", max_rate_hz=10, takes_s=0.0)
+    graph.connect(camera.out, graph.add(Box(), name="box").number, deadline_s=outer_s)
+    (path,) = analyse_time(graph).paths
+    assert (path.node, path.deadline_s) == ("box/inner", least_s)
+
+
 # --- beside runs ---
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 import hfg
-from hfg.engine import Glance
+from hfg.engine import Glance, MonitorGlance
 from hfg.trace import RunStarted, TraceEvent
 
 
@@ -22,6 +22,11 @@ def halved(number: int) -> int:
     if number == 7:
         raise ValueError(number)
     return number // 2
+
+
+@hfg.node
+async def slowly(number: int) -> None:
+    await asyncio.sleep(0.3)
 
 
 class Box(hfg.Subgraph):
@@ -89,3 +94,23 @@ def test_what_begin_raises_comes_out_and_nothing_was_set_up() -> None:
     with pytest.raises(LookupError, match="halves"):
         hfg.run(graph, clock="virtual", begin=begin)
     assert hfg.run(graph, clock="virtual").outcome == "done"
+
+
+def test_a_glance_tells_what_monitors_have_found_and_how_old_data_has_become() -> None:
+    async def main() -> Glance:
+        graph = hfg.Graph("late")
+        slow = graph.add(slowly(), deadline_s=0.1)
+        graph.connect(graph.add(numbers(), max_rate_hz=1).out, slow.number)
+        graph.monitor("few", "never(sent(numbers.out, value > 2))")
+        async with hfg.running(graph) as run:
+            run.glance()
+            await run.wait_finished()
+            return run.glance()
+
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        glance = runner.run(main())
+    assert glance.monitors == [MonitorGlance("few", "violated", 1)]
+    assert {node.path: (node.deadline_s, round(node.oldest_s, 6)) for node in glance.nodes} == {
+        "numbers": (0.0, 0.0),
+        "slowly": (0.1, 0.3),
+    }

@@ -275,8 +275,7 @@ def test_an_edit_of_a_running_graph_changes_deadlines() -> None:
             graph.connect(values, graph.add(Busy(), name=name).value)
         async with hfg.running(graph) as run, run.feed(values) as into:
             await into.send(1)
-            gone = commands.Disconnect("values", "second.value")
-            await run.edit(gone, commands.Connect("values", "second.value", deadline_s=0.5))
+            await run.edit(commands.SetEdge("values", "second.value", deadline_s=0.5))
             await into.send(2)
         return list(Busy.order)
 

@@ -53,6 +53,7 @@ from hfg.trace import ParameterSet, StructureChanged
 
 __all__ = ["Edits"]
 
+_MAY_CHANGE = ("active", "deadline_s")  # options of an edge that do not concern the tokens on it
 _Switched = dict[RunningNode, bool]
 """Nodes and subgraphs, and whether they are enabled or disabled."""
 
@@ -362,7 +363,9 @@ def _refuse_for_good(change: Change) -> None:
         )
     if isinstance(change, EdgeSwap):
         old, new = change.old.options, change.new.options
-        others = [one for one in old.__struct_fields__ if one != "active" and getattr(old, one) != getattr(new, one)]
+        others = [
+            one for one in old.__struct_fields__ if one not in _MAY_CHANGE and getattr(old, one) != getattr(new, one)
+        ]
         if others:
             raise GraphError(
                 f'"{change.new.label}" keeps its {others[0]} while the graph runs, for tokens may lie on it; '

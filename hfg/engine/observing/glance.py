@@ -99,7 +99,8 @@ def glance_at(engine: Engine, measuring: Measuring) -> Glance:
     for worker in engine.core.workers:
         if worker.type is None or worker.scope is not None:
             continue
-        meter = worker.meter
+        deadline_s = deadlines.get(worker.path, 0.0)
+        meter = measuring.fold(worker) if deadline_s else worker.meter
         nodes.append(
             NodeGlance(
                 worker.path,
@@ -113,7 +114,7 @@ def glance_at(engine: Engine, measuring: Measuring) -> Glance:
                 worker.firings_under_way(),
                 worker.counts.retries,
                 fused=is_fused(worker),
-                deadline_s=deadlines.get(worker.path, 0.0),
+                deadline_s=deadline_s,
                 oldest_s=0.0 if meter is None else meter.delays.longest,
             )
         )
