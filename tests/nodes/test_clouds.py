@@ -312,7 +312,20 @@ def test_a_map_that_is_empty_is_refused_by_one_sentence() -> None:
         fire(clouds.grid_costs(), grid=empty)
 
 
-def test_a_cloud_that_is_too_dense_to_be_clustered_is_refused() -> None:
-    dense = cloud(np.random.default_rng(1).uniform(0, 1, (100_000, 3)))
-    with pytest.raises(ValueError, match=r"too dense for clusters with a gap of 0.1 m; thin them first, with clouds"):
-        fire(clouds.cluster_points(gap=0.1), cloud=dense)
+def test_dense_surfaces_are_apart_exactly_if_they_are_farther_apart_than_the_gap() -> None:
+    """Two slanted planes of many points: cells of both are near to each other, and each point decides."""
+    slant = np.array([[2.0, 1.0], [0.0, 2.0], [1.0, -2.0]]) / 3
+    plane = np.stack(np.meshgrid(*2 * [np.linspace(0, 0.5, 50)]), -1).reshape(-1, 2) @ slant.T
+    normal = np.cross(*slant.T) / np.linalg.norm(np.cross(*slant.T))
+    for off, count in ((0.1001, 2), (0.0999, 1)):
+        both = cloud(np.concatenate([plane, plane + off * normal]))
+        clusters, _ = clouds.cluster_points.function(both, gap=0.1)
+        assert len(clusters) == count
+
+
+def test_far_away_points_are_clustered_like_near_ones() -> None:
+    points = np.random.default_rng(6).uniform(0, 2, (200, 3))
+    scattered = np.random.default_rng(7).uniform(-1e12, 1e12, (300, 3))
+    near, _ = clouds.cluster_points.function(cloud(points), gap=0.2, least=2)
+    both, _ = clouds.cluster_points.function(cloud(np.concatenate([points, scattered])), gap=0.2, least=2)
+    assert [one.points for one in both] == [one.points for one in near]

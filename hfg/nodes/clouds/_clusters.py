@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
@@ -11,10 +12,11 @@ from annotated_types import Interval, Unit
 
 from hfg.geometry import PointCloud, Vector3
 from hfg.nodes._extras import require
-from hfg.nodes.clouds._shaping import cubes
 from hfg.nodetypes.functions import node
 
-_MOST_PAIRS = 10_000_000
+_MOST_CELLS = 2.0**62
+_FEW = 5000  # pairs of points that are compared one by one
+_TABLE = 4_000_000  # cells of which a table is faster than a search
 
 
 class Cluster(NamedTuple):
@@ -56,64 +58,167 @@ def cluster_points(
       labelled: the cloud with the field "cluster": the number of the cluster in the list, from 0; -1 for none.
 
     Raises:
-      ValueError: coordinates are not finite, or the points are so dense that they must be thinned before.
+      ValueError: coordinates are not finite, or there are millions of points, all of them far apart.
     """
     cloud.need_finite()
-    labels = _labels(cloud.points, gap) if len(cloud) else np.zeros(0, np.int64)
+    if not len(cloud):
+        return [], replace(cloud, fields={**cloud.fields, "cluster": np.zeros(0, np.int32)})
+    labels = _labels(cloud.points, gap)
     counts = np.bincount(labels)
     kept = np.flatnonzero((counts >= least) & (counts <= most))
     kept = kept[np.argsort(-counts[kept], kind="stable")]
     numbers = np.full(len(counts), -1, np.int32)
     numbers[kept] = np.arange(len(kept), dtype=np.int32)
-    number = numbers[labels] if len(labels) else np.zeros(0, np.int32)
-    space = np.zeros((len(cloud), 3))
-    space[:, : cloud.points.shape[1]] = cloud.points
-    order = np.argsort(number, kind="stable")
-    groups = np.split(order, np.searchsorted(number[order], np.arange(len(kept))))[1:]
+    number = numbers[labels]
+    return _clusters(cloud.points, number, counts[kept]), replace(cloud, fields={**cloud.fields, "cluster": number})
+
+
+def _clusters(points: Any, number: Any, counts: Any) -> list[Cluster]:
+    """Measure clusters, of which each point has the number, or -1."""
+    if not len(counts):
+        return []
+    space = np.zeros((len(points), 3))
+    space[:, : points.shape[1]] = points
+    some = space[np.argsort(number, kind="stable")[-counts.sum() :]]
+    begin = np.cumsum(counts) - counts
     with np.errstate(over="ignore"):
-        clusters = [
-            Cluster(space[group].mean(0), space[group].min(0), space[group].max(0), len(group)) for group in groups
-        ]
-    return clusters, replace(cloud, fields={**cloud.fields, "cluster": number})
+        parts = [one.reduceat(some, begin) for one in (np.add, np.minimum, np.maximum)]
+        parts[0] /= counts[:, None]
+    return [Cluster(mean, low, high, count) for mean, low, high, count in zip(*parts, counts.tolist(), strict=True)]
 
 
 def _labels(points: Any, gap: float) -> Any:
     """Return the number of each point's cluster, numbered by their first points.
 
-    All points of a cube that is much smaller than the gap belong together. So pairs are searched among one point of
-    each cube. Where these leave open whether two clusters are one, all points decide, so the result is exact.
+    Space is cut into cells whose diagonal is the gap, so all points of a cell belong together, and only cells that are
+    at most two apart can be joined. If the first points of two cells are near enough, they are; where these leave open
+    whether two clusters are one, all points of the two cells decide. So the result is exact.
     """
-    across = gap / 4
-    first, cube = cubes(points, across / math.sqrt(points.shape[1]))
-    some = points[first]
-    pairs = _pairs(some, gap + 2 * across, gap)
-    off = some[pairs[:, 0]] - some[pairs[:, 1]]
-    near = (off * off).sum(1) <= gap * gap
-    label = _components(pairs[near], len(some))
-    far = pairs[~near]
-    open_cubes = np.zeros(len(some), bool)
-    open_cubes[far[label[far[:, 0]] != label[far[:, 1]]]] = True
-    left = np.flatnonzero(open_cubes[cube])
-    if len(left):
-        joined = label[cube[left][_pairs(points[left], gap, gap)]]
-        label = _components(joined, int(label.max()) + 1)[label]
-    _, begin, number = np.unique(label[cube], return_index=True, return_inverse=True)
-    return np.argsort(np.argsort(begin))[number.reshape(-1)]
+    cells = _Cells(points, gap)
+    first, label = cells.points[cells.begin], np.arange(len(cells.begin))
+    for reach in (1, 2):  # most of what belongs together already does by cells that touch
+        one, other = cells.neighbours(reach)
+        open_ = label[one] != label[other]
+        one, other = one[open_], other[open_]
+        near = _squares(first[one] - first[other]) <= gap * gap
+        label = _joined(label, one[near], other[near])
+    left = np.stack([one[~near], other[~near]], 1)
+    left = left[(label[left[:, 0]] != label[left[:, 1]]) & (cells.counts[left].max(1) > 1)]
+    apart = np.maximum(cells.low[left[:, 1]] - cells.high[left[:, 0]], cells.low[left[:, 0]] - cells.high[left[:, 1]])
+    left = left[_squares(np.maximum(apart, 0)) <= gap * gap]
+    joined = np.array(cells.joined(left, label, gap), np.int64).reshape(-1, 2)
+    label = _joined(label, joined[:, 0], joined[:, 1])
+    begin = np.full(int(label.max()) + 1, len(points))
+    np.minimum.at(begin, label, cells.order[cells.begin])
+    numbers = np.empty(len(points), np.int64)
+    numbers[cells.order] = np.repeat(np.argsort(np.argsort(begin))[label], cells.counts)
+    return numbers
 
 
-def _pairs(points: Any, reach: float, gap: float) -> Any:
-    """Return all pairs of points that are not farther apart than a distance."""
-    crowds = np.bincount(cubes(points, reach)[1]).astype(float)
-    if 2 * (crowds * crowds).sum() > _MOST_PAIRS:  # about as many as there would be
+class _Cells:
+    """Points sorted by cells."""
+
+    def __init__(self, points: Any, gap: float) -> None:
+        side = gap / math.sqrt(points.shape[1]) * (1 - 1e-9)
+        with np.errstate(over="ignore"):
+            index, spans = _compressed(np.floor(points / side))
+        # Two empty cells on each side, so that neighbours never wrap round.
+        self.strides = np.concatenate([np.cumprod((spans + 4)[::-1])[-2::-1], [1]])
+        self.size = int(np.prod(spans + 4))
+        keys = index @ self.strides
+        self.order = np.argsort(keys, kind="stable")
+        keys = keys[self.order]
+        self.begin = np.flatnonzero(np.concatenate([[True], keys[1:] != keys[:-1]]))
+        self.keys = keys[self.begin]
+        self.counts = np.diff(self.begin, append=len(keys))
+        self.table: Any = None
+        if self.size <= _TABLE:
+            self.table = np.zeros(self.size + 1, np.int32)
+            self.table[self.keys + 1] = 1
+            np.cumsum(self.table, out=self.table)
+        self.points = points[self.order]
+        self.low, self.high = (one.reduceat(self.points, self.begin) for one in (np.minimum, np.maximum))
+
+    def before(self, keys: Any) -> Any:
+        """Return how many cells there are before keys."""
+        if self.table is None:
+            return np.searchsorted(self.keys, keys)
+        return self.table[np.minimum(keys, self.size)]
+
+    def neighbours(self, reach: int) -> tuple[Any, Any]:
+        """Return the pairs of cells that are at most `reach` apart along each axis, each once."""
+        count = len(self.keys)
+        ones, others, numbers = [], [], np.arange(count, dtype=np.int32)
+        for steps in itertools.product(range(-reach, reach + 1), repeat=len(self.strides) - 1):
+            row = int(np.dot(steps, self.strides[:-1]))
+            if row >= 0:
+                low, high = self.keys + (row - reach if row else 1), self.keys + row + reach + 1
+                begin = self.before(low)
+                some = self.before(high) - begin
+                one = np.repeat(numbers, some)
+                ones.append(one)
+                others.append(np.arange(len(one), dtype=np.int32) + np.repeat(begin - np.cumsum(some) + some, some))
+        return np.concatenate(ones), np.concatenate(others)
+
+    def joined(self, pairs: Any, label: Any, gap: float) -> list[tuple[int, int]]:
+        """Return the pairs that join two clusters, by all of their points, but none that others have joined."""
+        above = dict.fromkeys(np.unique(label[pairs]).tolist(), -1)
+
+        def top(one: int) -> int:
+            while above[one] >= 0:
+                one = above[one]
+            return one
+
+        found = []
+        for one, other in pairs.tolist():
+            first, second = top(int(label[one])), top(int(label[other]))
+            if first != second and _nearest(self._of(one), self._of(other), gap) <= gap * gap:
+                above[first] = second
+                found.append((one, other))
+        return found
+
+    def _of(self, cell: int) -> Any:
+        return self.points[self.begin[cell] : self.begin[cell] + self.counts[cell]]
+
+
+def _nearest(one: Any, other: Any, gap: float) -> float:
+    """Return the square of the least distance between two sets of points, if it is not much more than the gap."""
+    if len(one) * len(other) > _FEW:
+        near, at = require("scipy.spatial", "robotics").cKDTree(one).query(other, distance_upper_bound=gap * (1 + 1e-9))
+        best = int(near.argmin())
+        if not math.isfinite(near[best]):
+            return math.inf
+        one, other = one[at[best : best + 1]], other[best : best + 1]
+    return float(_squares((one[:, None] - other).reshape(-1, one.shape[1])).min())
+
+
+def _compressed(whole: Any) -> tuple[Any, Any]:
+    """Return whole numbers counted from the least, and how many there are; if too many, wide gaps become narrow.
+
+    Raises:
+      ValueError: there are too many for one number for each cell.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        index = whole - whole.min(0)
+        if not np.prod(index.max(0) + 5) < _MOST_CELLS:  # or it is NaN
+            for axis, column in enumerate(whole.T):
+                values, place = np.unique(column, return_inverse=True)
+                index[:, axis] = np.concatenate([[0], np.cumsum(np.minimum(np.diff(values), 3))])[place.reshape(-1)]
+    if np.prod(index.max(0) + 5) >= _MOST_CELLS:
         raise ValueError(
-            f"the points are too dense for clusters with a gap of {gap:g} m; thin them first, with "
-            f"clouds.voxel_grid(side={gap / 2:g})"
+            "there are too many points, too far apart, for clusters; thin them first, with clouds.voxel_grid"
         )
-    return require("scipy.spatial", "robotics").cKDTree(points).query_pairs(reach, output_type="ndarray")
+    return index.astype(np.int64), index.max(0).astype(np.int64) + 1
 
 
-def _components(joined: Any, count: int) -> Any:
-    """Return the number of the component of each of some things of which pairs are joined."""
+def _squares(off: Any) -> Any:
+    with np.errstate(over="ignore"):
+        return (off * off).sum(1)
+
+
+def _joined(label: Any, one: Any, other: Any) -> Any:
+    """Return new labels of things, of which pairs are now joined."""
     sparse, graphs = require("scipy.sparse", "robotics"), require("scipy.sparse.csgraph", "robotics")
-    matrix = sparse.coo_matrix((np.ones(len(joined), np.int8), joined.T), shape=(count, count))
-    return graphs.connected_components(matrix, directed=False)[1]
+    count = int(label.max()) + 1
+    matrix = sparse.coo_matrix((np.ones(len(one)), (label[one], label[other])), shape=(count, count))
+    return graphs.connected_components(matrix, directed=False)[1][label]
