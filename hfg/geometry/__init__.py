@@ -2,6 +2,7 @@
 
     transforms   Transform, and the arrays it consists of
     records      values with a frame and a stamp: FrameTransform, PoseInFrame, LaserScan, RingScan, PointCloud, Grid
+    scenes       what a 3-D view shows: Scene, of Solid, Line and Label
     tree         TransformTree: frames over time, and how to get from one to another
 
 Lengths are in metres, angles in radians, stamps in seconds on the run's clock. Frames are right-handed: x ahead, y to
@@ -10,6 +11,7 @@ in Foxglove's schemas. Depends on `types` and numpy.
 """
 
 from hfg.geometry.records import FrameTransform, Grid, LaserScan, PointCloud, PoseInFrame, RingScan
+from hfg.geometry.scenes import Label, Line, Scene, Solid
 from hfg.geometry.transforms import Coordinates, Quaternion, Transform, Vector3
 from hfg.geometry.tree import FrameError, TransformTree
 
@@ -18,11 +20,15 @@ __all__ = [
     "FrameError",
     "FrameTransform",
     "Grid",
+    "Label",
     "LaserScan",
+    "Line",
     "PointCloud",
     "PoseInFrame",
     "Quaternion",
     "RingScan",
+    "Scene",
+    "Solid",
     "Transform",
     "TransformTree",
     "Vector3",

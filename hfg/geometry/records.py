@@ -35,12 +35,13 @@ Cells: TypeAlias = Annotated[
 """Values of a grid: rows go along x, columns along y."""
 
 
-def _equal(one: object, other: object) -> bool:
+def equal(one: object, other: object) -> bool:
     """Compare two records of arrays by their parts, which a dataclass cannot."""
     return same(one, other)
 
 
-def _need_header(frame_id: Any, stamp: Any) -> None:
+def need_header(frame_id: Any, stamp: Any) -> None:
+    """Refuse a frame without a name, and a stamp that is not finite."""
     if not isinstance(frame_id, str) or not frame_id:
         raise ValueError(f"a frame has a name, got {frame_id!r}")
     if not math.isfinite(stamp):
@@ -68,11 +69,11 @@ class FrameTransform:
     stamp: float = 0.0
     static: bool = False
 
-    __eq__ = _equal
+    __eq__ = equal
 
     def __post_init__(self) -> None:
-        _need_header(self.parent, self.stamp)
-        _need_header(self.child, self.stamp)
+        need_header(self.parent, self.stamp)
+        need_header(self.child, self.stamp)
         if self.parent == self.child:
             raise ValueError(f'a frame is not its own parent, got "{self.child}" twice')
 
@@ -94,10 +95,10 @@ class PoseInFrame:
     stamp: float
     pose: Transform
 
-    __eq__ = _equal
+    __eq__ = equal
 
     def __post_init__(self) -> None:
-        _need_header(self.frame_id, self.stamp)
+        need_header(self.frame_id, self.stamp)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,10 +127,10 @@ class LaserScan:
     min_range: Annotated[float, Ge(0)] = 0.0
     max_range: Annotated[float, Gt(0)] = 30.0
 
-    __eq__ = _equal
+    __eq__ = equal
 
     def __post_init__(self) -> None:
-        _need_header(self.frame_id, self.stamp)
+        need_header(self.frame_id, self.stamp)
         if self.ranges.ndim != 1:
             raise ValueError(f"a scan has one range for each beam, got an array of {self.ranges.shape}")
         if not (math.isfinite(self.start_angle) and math.isfinite(self.step)):
@@ -175,10 +176,10 @@ class RingScan:
     min_range: Annotated[float, Ge(0)] = 0.0
     max_range: Annotated[float, Gt(0)] = 100.0
 
-    __eq__ = _equal
+    __eq__ = equal
 
     def __post_init__(self) -> None:
-        _need_header(self.frame_id, self.stamp)
+        need_header(self.frame_id, self.stamp)
         if self.ranges.ndim != 2 or self.elevations.shape != self.ranges.shape[:1]:
             raise ValueError(
                 "each ring has a row of ranges and an elevation, got arrays of "
@@ -215,10 +216,10 @@ class PointCloud:
     points: Coordinates
     fields: dict[str, Column] = field(default_factory=dict)
 
-    __eq__ = _equal
+    __eq__ = equal
 
     def __post_init__(self) -> None:
-        _need_header(self.frame_id, self.stamp)
+        need_header(self.frame_id, self.stamp)
         if self.points.ndim != 2 or self.points.shape[1] not in (2, 3):
             raise ValueError(f"a cloud has rows of x, y or of x, y, z, got an array of {self.points.shape}")
         for name, values in self.fields.items():
@@ -271,10 +272,10 @@ class Grid:
     cell: Annotated[float, Gt(0)]
     values: Cells
 
-    __eq__ = _equal
+    __eq__ = equal
 
     def __post_init__(self) -> None:
-        _need_header(self.frame_id, self.stamp)
+        need_header(self.frame_id, self.stamp)
         if not (math.isfinite(self.cell) and self.cell > 0):
             raise ValueError(f"the side of a cell is a length above 0, got {self.cell}")
         if self.values.ndim != 2:

@@ -11,6 +11,7 @@ import contextlib
 import hashlib
 import math
 import os
+import struct
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -276,7 +277,44 @@ def _try_cascade(data: bytes) -> None:
     detector.detectMultiScale(np.random.default_rng(1).integers(0, 255, (height, width), np.uint8))
 
 
-_TRIES: Final[Mapping[str, Callable[[bytes], None]]] = {"cascade": _try_cascade, "model": _try_model}
+def tried_with(shape: tuple[int, ...], network: bytes) -> bytes:
+    """Return the bytes that say with which input a network is to be tried."""
+    return struct.pack(f"<{len(shape) + 1}I", len(shape), *shape) + network
+
+
+def _input_and_network(data: bytes) -> tuple[Any, bytes]:
+    (count,) = struct.unpack_from("<I", data)
+    shape = struct.unpack_from(f"<{count}I", data, 4)
+    values = np.random.default_rng(1).uniform(0, 1, shape).astype(np.float32)
+    return values, data[4 * (count + 1) :]
+
+
+def _try_opencv(data: bytes) -> None:
+    tensor, network = _input_and_network(data)
+    net = cv2.dnn.readNetFromONNX(np.frombuffer(network, np.uint8))
+    net.setInput(tensor)
+    net.forward(net.getUnconnectedOutLayersNames())
+
+
+def _try_session(data: bytes) -> None:
+    import onnxruntime
+
+    tensor, network = _input_and_network(data)
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1  # each thread's stack counts as memory
+    try:
+        session = onnxruntime.InferenceSession(network, options, providers=["CPUExecutionProvider"])
+        session.run(None, {session.get_inputs()[0].name: tensor})
+    except Exception as error:  # its errors have no common class
+        raise ValueError(str(error)) from None
+
+
+_TRIES: Final[Mapping[str, Callable[[bytes], None]]] = {
+    "cascade": _try_cascade,
+    "model": _try_model,
+    "opencv": _try_opencv,
+    "session": _try_session,
+}
 _MOST_TRUSTED: Final = 1000
 _trusted: Final[set[bytes]] = set()
 
@@ -292,7 +330,7 @@ def need_harmless(kind: str, data: bytes) -> None:
     """See that a process that reads a file and uses it survives that.
 
     Args:
-      kind: "model" or "cascade".
+      kind: "model", "cascade", "opencv" for a network that OpenCV runs, "session" for one that ONNX Runtime does.
       data: what the file holds.
 
     Raises:

@@ -14,7 +14,8 @@ from typing import Any, Final, NamedTuple
 import msgspec
 import numpy as np
 
-from hfg.geometry import FrameTransform, Grid, LaserScan, PointCloud, PoseInFrame, Transform
+from hfg.base.values import Colour
+from hfg.geometry import FrameTransform, Grid, LaserScan, PointCloud, PoseInFrame, Scene, Transform
 from hfg.recording.forms import bare
 
 _TYPES: Final = {"|u1": 1, "|i1": 2, "<u2": 3, "<i2": 4, "<u4": 5, "<i4": 6, "<f4": 7, "<f8": 8}
@@ -70,6 +71,8 @@ _PACKED: Final = {
     "type": "array",
     "items": _object("foxglove.PackedElementField", name=_TEXT, offset=_COUNT, type={"type": "integer"}),
 }
+_COLOUR: Final = _object("foxglove.Color", r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
+_SOLID: Final = {"pose": _POSE, "size": _VECTOR, "color": _COLOUR}
 _BYTES: Final = {"type": "string", "contentEncoding": "base64"}
 _LINK: Final = {
     "timestamp": _TIME,
@@ -77,6 +80,39 @@ _LINK: Final = {
     "child_frame_id": _TEXT,
     "translation": _VECTOR,
     "rotation": _QUATERNION,
+}
+
+
+def _list(title: str, **properties: Any) -> dict[str, Any]:
+    return {"type": "array", "items": _object(title, **properties)}
+
+
+_ENTITY: Final = {
+    **_HEADER,
+    "id": _TEXT,
+    "lifetime": _object("duration", sec={"type": "integer"}, nsec={**_COUNT, "maximum": 999999999}),
+    "frame_locked": {"type": "boolean"},
+    "cubes": _list("foxglove.CubePrimitive", **_SOLID),
+    "spheres": _list("foxglove.SpherePrimitive", **_SOLID),
+    "cylinders": _list("foxglove.CylinderPrimitive", **_SOLID, bottom_scale=_NUMBER, top_scale=_NUMBER),
+    "lines": _list(
+        "foxglove.LinePrimitive",
+        type={"type": "integer"},
+        pose=_POSE,
+        thickness=_NUMBER,
+        scale_invariant={"type": "boolean"},
+        points=_list("foxglove.Point3", x=_NUMBER, y=_NUMBER, z=_NUMBER),
+        color=_COLOUR,
+    ),
+    "texts": _list(
+        "foxglove.TextPrimitive",
+        pose=_POSE,
+        billboard={"type": "boolean"},
+        font_size=_NUMBER,
+        scale_invariant={"type": "boolean"},
+        color=_COLOUR,
+        text=_TEXT,
+    ),
 }
 
 
@@ -168,6 +204,53 @@ def _of_grid(value: Grid) -> dict[str, Any]:
     }
 
 
+def _colour(colour: Colour, opacity: float = 1.0) -> dict[str, float]:
+    return {"r": colour.red / 255, "g": colour.green / 255, "b": colour.blue / 255, "a": opacity}
+
+
+def _of_scene(value: Scene) -> dict[str, Any]:
+    """Return one entity, which takes the place of the one before, so nothing has to be deleted."""
+    solids: dict[str, list[dict[str, Any]]] = {"box": [], "ball": [], "cylinder": []}
+    for one in value.solids:
+        more = {"bottom_scale": 1.0, "top_scale": 1.0} if one.kind == "cylinder" else {}
+        seen = {"pose": _pose(one.pose), "size": _named(one.size), "color": _colour(one.colour, one.opacity)}
+        solids[one.kind].append({**seen, **more})
+    flat = {"pose": _pose(Transform.of()), "scale_invariant": False}
+    lines = [
+        {
+            **flat,
+            "type": 0,  # from point to point
+            "thickness": one.width,
+            "points": [{"x": 0.0, "y": 0.0, "z": 0.0} | _named(point) for point in one.points],
+            "color": _colour(one.colour),
+        }
+        for one in value.lines
+    ]
+    texts = [
+        {
+            "pose": _pose(Transform(one.place, np.array([0.0, 0.0, 0.0, 1.0]))),
+            "billboard": True,
+            "font_size": one.height,
+            "scale_invariant": False,
+            "color": _colour(one.colour),
+            "text": one.text,
+        }
+        for one in value.labels
+    ]
+    entity = {
+        **_header(value),
+        "id": "scene",
+        "lifetime": _time(value.lifetime_s),
+        "frame_locked": False,
+        "cubes": solids["box"],
+        "spheres": solids["ball"],
+        "cylinders": solids["cylinder"],
+        "lines": lines,
+        "texts": texts,
+    }
+    return {"deletions": [], "entities": [entity]}
+
+
 _TRANSFORMS: Final = Shown(
     "foxglove.FrameTransforms",
     {"transforms": {"type": "array", "items": _object("foxglove.FrameTransform", **_LINK)}},
@@ -206,5 +289,13 @@ _SHOWN: Final = {
             "data": _BYTES,
         },
         _of_grid,
+    ),
+    Scene: Shown(
+        "foxglove.SceneUpdate",
+        {
+            "deletions": _list("foxglove.SceneEntityDeletion", timestamp=_TIME, type={"type": "integer"}, id=_TEXT),
+            "entities": _list("foxglove.SceneEntity", **_ENTITY),
+        },
+        _of_scene,
     ),
 }

@@ -265,3 +265,184 @@ def test_the_jacobian_of_the_fusion_is_its_derivative() -> None:
     jacobian = np.stack([(moved(state + 1e-6 * axis) - moved(state - 1e-6 * axis)) / 2e-6 for axis in np.eye(4)], 1)
     _, covariance = node._moved(state, np.eye(4), twist, 0.3, 0.01)
     assert np.allclose(covariance, jacobian @ jacobian.T, atol=1e-6)
+
+
+# --- extended filters ---
+
+
+def range_and_bearing(state: np.ndarray) -> np.ndarray:
+    """What a landmark at 3, 4 looks like from x, y, heading."""
+    off = np.array([3.0, 4.0]) - state[:2]
+    return np.array([math.hypot(*off), math.remainder(math.atan2(off[1], off[0]) - state[2], 2 * math.pi)])
+
+
+def unicycle(state: np.ndarray, control: np.ndarray, dt: float) -> np.ndarray:
+    v, omega = control
+    return state + dt * np.array([v * math.cos(state[2]), v * math.sin(state[2]), omega])
+
+
+def by_hand(state: np.ndarray, control: np.ndarray, dt: float) -> np.ndarray:
+    v, _ = control
+    return np.array([[1, 0, -dt * v * math.sin(state[2])], [0, 1, dt * v * math.cos(state[2])], [0, 0, 1]])
+
+
+def seen_by_hand(state: np.ndarray) -> np.ndarray:
+    x, y = 3.0 - state[0], 4.0 - state[1]
+    far = math.hypot(x, y)
+    return np.array([[-x / far, -y / far, 0], [y / far**2, -x / far**2, -1]])
+
+
+UNICYCLE: dict[str, Any] = {
+    "motion": unicycle, "measurement": range_and_bearing, "start": [0.1, -0.1, 0.05], "start_sigma": [0.3, 0.3, 0.2],
+    "process_noise": np.diag([0.01, 0.01, 0.02]).tolist(), "measurement_noise": np.diag([0.04, 0.01]).tolist(),
+    "angles": [1],
+}  # fmt: skip
+
+
+def test_an_extended_filter_knows_the_jacobians_that_it_is_not_given() -> None:
+    rng = np.random.default_rng(7)
+    true, seen, told = np.zeros(3), [], []
+    for _ in range(60):
+        control = np.array([0.8, 0.4])
+        seen.append(range_and_bearing(true) + rng.normal(0, 1, 2) * [0.2, 0.1])
+        told.append(control)
+        true = unicycle(true, control, 0.1)
+    seen[20][:] = np.nan
+    numeric = ran(estimation.ExtendedKalmanFilter(**UNICYCLE), 10, measured=seen, control=told)
+    exact = ran(
+        estimation.ExtendedKalmanFilter(**UNICYCLE, motion_jacobian=by_hand, measurement_jacobian=seen_by_hand),
+        10, measured=seen, control=told,
+    )  # fmt: skip
+    assert np.allclose(numeric["state"], exact["state"], atol=1e-6)
+    assert np.allclose(numeric["covariance"], exact["covariance"], atol=1e-6)
+    # the same in information form, step by step
+    state, covariance = np.array(UNICYCLE["start"]), np.diag(np.square(UNICYCLE["start_sigma"]))
+    noise = np.diag([0.04, 0.01])
+    for number, measured in enumerate(seen):
+        if number:
+            jacobian = by_hand(state, told[number], 0.1)
+            covariance = jacobian @ covariance @ jacobian.T + 0.1 * np.diag([0.01, 0.01, 0.02])
+            state = unicycle(state, told[number], 0.1)
+        if not np.isnan(measured).any():
+            look, off = seen_by_hand(state), measured - range_and_bearing(state)
+            off[1] = math.remainder(off[1], 2 * math.pi)
+            information = np.linalg.inv(covariance) + look.T @ np.linalg.inv(noise) @ look
+            spread = look @ covariance @ look.T + noise
+            assert exact["distance"][number] == pytest.approx(math.sqrt(off @ np.linalg.inv(spread) @ off))
+            state = state + np.linalg.solve(information, look.T @ np.linalg.inv(noise) @ off)
+            covariance = np.linalg.inv(information)
+        else:
+            assert math.isnan(exact["distance"][number])
+        assert np.allclose(exact["state"][number], state)
+        assert np.allclose(exact["covariance"][number], covariance)
+
+
+def test_with_linear_models_an_extended_filter_is_a_kalman_filter() -> None:
+    rng = np.random.default_rng(8)
+    measured = [np.array([one]) for one in np.cumsum(rng.normal(0.3, 0.5, 12))]
+    noise = np.array([[0.02, 0.01], [0.01, 0.04]])
+    extended = ran(
+        estimation.ExtendedKalmanFilter(
+            process_noise=(2 * noise).tolist(), measurement_noise=[[0.25]], start=[0.0, 0.0], start_sigma=[10.0, 10.0]
+        ),
+        2, measured=measured,
+    )  # fmt: skip
+    state, covariance = np.zeros(2), np.eye(2) * 100
+    for number, one in enumerate(measured):
+        if number:
+            state, covariance = estimation.predict(state, covariance, STEP, noise)
+        state, covariance = estimation.correct(state, covariance, one, SEEN, NOISE)
+        assert np.allclose(extended["state"][number], state)
+        assert np.allclose(extended["covariance"][number], covariance)
+
+
+def test_a_measurement_outside_of_the_gate_is_left_out() -> None:
+    node = estimation.ExtendedKalmanFilter(start_sigma=[0.1] * 4, gate=3.0)
+    done = fire(node, measured=np.array([5.0, 0.0])).outputs
+    assert done["distance"] == pytest.approx(5.0 / math.sqrt(0.01 + 0.01))
+    assert done["state"].tolist() == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"measurement": lambda state: state}, 'the function "measurement" returns 2 finite numbers, got 4: '),
+        ({"measurement": lambda state: state[:2] * math.nan}, 'the function "measurement" returns 2 finite numbers'),
+        (
+            {"measurement_jacobian": lambda state: np.eye(2)},
+            '"measurement_jacobian" returns 2 x 4 finite numbers, got 2 x 2',
+        ),
+        ({"start_sigma": [1.0]}, "each number of the state has a standard deviation, got 4 in start and 1"),
+        ({"process_noise": [[1.0]]}, "got 1 rows for 4"),
+        ({"measurement_noise": [[1.0, 2.0], [2.0, -9e9]]}, "the covariance of a measurement is singular or not finite"),
+        ({"angles": [2]}, "angles are numbers of a measurement, from 0 to 1, got \\[2\\]"),
+    ],
+)
+def test_what_does_not_fit_an_extended_filter_is_one_sentence(parameters: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        fire(estimation.ExtendedKalmanFilter(**parameters), measured=np.zeros(2))
+
+
+# --- clusters to tracks ---
+
+
+def labelled(groups: Any, stamp: float = 0.0) -> PointCloud:
+    points = np.concatenate([np.asarray(one, float) for _, one in groups])
+    numbers = np.concatenate([np.full(len(one), number, np.int32) for number, one in groups])
+    return PointCloud("map", stamp, points, {"cluster": numbers})
+
+
+def test_clusters_become_detections_with_the_covariance_of_their_points() -> None:
+    rng = np.random.default_rng(9)
+    groups = [(1, rng.normal([2, 3, 0], [0.3, 0.1, 0.2], (50, 3))), (-1, rng.normal(0, 9, (5, 3)))]
+    groups.append((0, rng.normal([5, -1, 0], [0.05, 0.2, 0.9], (30, 3))))
+    cloud = labelled(groups)
+    mixed = cloud.select(rng.permutation(len(cloud)))
+    found = fire(estimation.cluster_detections(noise=0.1, share=0.5), labelled=mixed).outputs["out"]
+    assert found.fields["cluster"].tolist() == [0, 1]
+    assert found.fields["points"].tolist() == [30, 50]
+    for row, points in enumerate([groups[2][1], groups[0][1]]):
+        spread = 0.01 * np.eye(2) + 0.5 * np.cov(points[:, :2].T, bias=True)
+        assert np.allclose(found.points[row], points[:, :2].mean(0))
+        names = ("cov_xx", "cov_xy", "cov_yy")
+        assert [found.fields[name][row] for name in names] == pytest.approx([spread[0, 0], spread[0, 1], spread[1, 1]])
+    low = fire(estimation.cluster_detections(height=1.5), labelled=mixed).outputs["out"]
+    assert low.fields["cluster"].tolist() == [1]
+    none = fire(estimation.cluster_detections(), labelled=labelled([(-1, np.zeros((4, 2)))])).outputs["out"]
+    assert len(none) == 0
+
+
+def test_a_track_trusts_each_detection_as_much_as_its_covariance_says() -> None:
+    sharp, vague = np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]])
+    fields = {"cov_xx": np.array([0.0001]), "cov_xy": np.array([0.0]), "cov_yy": np.array([1e4])}
+    node = estimation.TrackPoints(confirm=1, acceleration=0.0, fastest=0.0, gate=100.0)
+    fire(node, detections=PointCloud("map", 0.0, np.array([[0.0, 0.0]])))
+    (one,) = fire(node, detections=PointCloud("map", 0.1, sharp + vague, fields)).outputs["tracks"]
+    assert one.x == pytest.approx(1.0, abs=0.02)
+    assert one.y == pytest.approx(0.0, abs=0.02)
+
+
+def test_people_are_tracked_from_clusters() -> None:
+    """Two people walk past each other; what a laser sees of them changes from scan to scan."""
+    rng = np.random.default_rng(10)
+    node, numbers = estimation.TrackPoints(forget_s=0.5), set()
+    for tick in range(40):
+        t = tick / 10
+        people = [np.array([t - 2, 0.4]), np.array([2 - t, -0.4])]
+        groups = [(number, one + rng.normal(0, 0.12, (rng.integers(8, 30), 2))) for number, one in enumerate(people)]
+        detections = fire(estimation.cluster_detections(), labelled=labelled(groups, t)).outputs["out"]
+        tracks = fire(node, detections=detections).outputs["tracks"]
+        numbers |= {track.number for track in tracks}
+        if tick > 5:
+            assert len(tracks) == 2
+            for track in tracks:
+                assert min(math.dist((track.x, track.y), one) for one in people) < 0.25
+    assert numbers == {1, 2}
+
+
+def test_a_cloud_without_clusters_and_a_singular_detection_are_refused() -> None:
+    with pytest.raises(ValueError, match='has no field "cluster", but none; take the output "labelled" of'):
+        fire(estimation.cluster_detections(), labelled=cloud([(1, 2)], 0.0))
+    fields = {"cov_xx": np.array([1.0]), "cov_xy": np.array([1.0]), "cov_yy": np.array([1.0])}
+    with pytest.raises(ValueError, match="the covariance of a measurement is singular or not finite"):
+        fire(estimation.TrackPoints(), detections=PointCloud("map", 0.0, np.zeros((1, 2)), fields))

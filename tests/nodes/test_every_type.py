@@ -17,12 +17,19 @@ from hfg.testing import Trial
 from hfg.testing.usable import try_all
 
 NEEDS: dict[str, str] = {
+    "hfg.nodes.estimation:ExtendedKalmanFilter": "a measurement of the size of its matrices",
     "hfg.nodes.estimation:KalmanFilter": "a measurement of the size of its matrices",
     "hfg.nodes.estimation:OmniTwist": "a speed for each of its wheels",
+    "hfg.nodes.estimation:cluster_detections": "a cloud with clusters",
     "hfg.nodes.links:Publish": "a graph around it, which says the type",
     "hfg.nodes.links:Subscribe": "a graph around it, which says the type",
+    "hfg.nodes.mapping:load_map": "a map file",
+    "hfg.nodes.scenes:scene_of_clusters": "a cloud with clusters",
     "hfg.nodes.video:Camera": "a camera",
     "hfg.nodes.video:Screenshot": "a screen",
+    "hfg.nodes.vision:DetectObjects": "a file with a network",
+    "hfg.nodes.vision:RunNetwork": "a file with a network",
+    "hfg.nodes.vision:ssd_boxes": "a result of such a detector",
 }
 """What a test machine has not; such a type may refuse every firing, but only by an error that it declares."""
 

@@ -8,9 +8,13 @@ from typing import Annotated, Any
 import numpy as np
 from annotated_types import Interval, Unit
 
+from hfg.nodes.driving._grids import Poses
+from hfg.nodes.driving._maneuvers import Gears
 from hfg.nodes.estimation import Twist
 from hfg.nodes.robotics import Pose, Positions
 from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
+from hfg.ports import Input, Output, Parameter, State
 
 
 def _need_path(path: Any, pose: Any) -> None:
@@ -137,3 +141,74 @@ def stanley_steering(
         error = -math.sin(heading) * off[0] + math.cos(heading) * off[1]
     turn = math.remainder(heading - float(pose[2]), 2 * math.pi)
     return max(-limit, min(limit, turn + math.atan2(gain * float(error), softening + abs(speed))))
+
+
+class FollowManeuver(Node):
+    """Follow a plan that changes between forwards and backwards, piece by piece, each by pure pursuit.
+
+    Fires once per plan and pose. A plan is new if its poses are others than those of the last firing; then it begins
+    with the first piece. See `pure_pursuit`.
+
+    Attributes:
+      look_ahead: distance to the point that is driven to; near the end of a piece it is shorter.
+      speed: on the way.
+      slow: near the end of a piece the speed is at most this for each metre that is left.
+      tolerance: how near to its end a piece is done.
+      turn_limit: the robot does not turn faster; it drives more slowly instead.
+      path: in the frame of the pose, such as that of `plan_maneuver`.
+      gears: for each pose of the path 1 for forwards, -1 for backwards.
+      pose: of the robot.
+      twist: in the frame of the robot; all 0 when the last piece is done.
+      piece: number of the piece that is driven, from 0; the number of pieces when all are done.
+
+    Raises:
+      ValueError: the path is empty, a number is not finite, or there is not one gear for each pose.
+    """
+
+    look_ahead = Parameter(0.5, Interval(ge=0.01, le=100), unit="m")
+    speed = Parameter(0.5, Interval(gt=0, le=100), unit="m/s")
+    slow = Parameter(1.0, Interval(gt=0, le=100), unit="1/s")
+    tolerance = Parameter(0.1, Interval(ge=0, le=100), unit="m")
+    turn_limit = Parameter(2.0, Interval(gt=0, le=100), unit="rad/s")
+    path = Input(Poses)
+    gears = Input(Gears)
+    pose = Input(Pose)
+    twist = Output(Twist)
+    piece = Output(int)
+
+    known: State[Any] = State(None)
+    done: State[int] = State(0)
+
+    def process(self, path: Poses, gears: Gears, pose: Pose) -> None:
+        """Drive on."""
+        _need_path(path, pose)
+        if len(gears) != len(path):
+            raise ValueError(f"each pose of a path has a gear, got {len(path)} poses and {len(gears)} gears")
+        if self.known is None or not np.array_equal(self.known, path):
+            self.known, self.done = path, 0
+        # A piece begins at the pose before its first gear, where the robot has stopped.
+        ends = [*(np.flatnonzero(np.diff(gears)) + 1).tolist(), len(path)]
+        twist = Twist(0.0, 0.0, 0.0)
+        while self.done < len(ends):
+            first = max(0, ends[self.done - 1] - 1) if self.done else 0
+            twist = self._driven(path[first : ends[self.done], :2], int(gears[ends[self.done] - 1]), pose)
+            if twist != Twist(0.0, 0.0, 0.0):
+                break
+            self.done += 1
+        self.twist.send(twist)
+        self.piece.send(self.done)
+
+    def _driven(self, path: Any, gear: int, pose: Any) -> Twist:
+        turn = 0.0 if gear >= 0 else math.pi
+        twist: Twist = pure_pursuit.function(
+            path,
+            pose + np.array([0.0, 0.0, turn]),
+            look_ahead=self.look_ahead,
+            speed=self.speed,
+            slow=self.slow,
+            tolerance=self.tolerance,
+            turn_limit=self.turn_limit,
+        )
+        if twist.vx == 0 and math.dist(path[-1], pose[:2]) <= self.look_ahead:
+            return Twist(0.0, 0.0, 0.0)  # just past the end; a car cannot turn on the spot for the rest
+        return Twist(twist.vx if gear >= 0 else -twist.vx, 0.0, twist.omega)

@@ -1,12 +1,14 @@
 """Estimation: Kalman filters, tracks of many targets, odometry of wheels and of an IMU.
 
 _kalman     predict, correct, KalmanFilter, AlphaBeta
-_tracks     TrackPoints, which needs SciPy
+_extended   ExtendedKalmanFilter
+_tracks     cluster_detections, TrackPoints, which needs SciPy
 _odometry   twists of differential, omnidirectional and Ackermann drives, IntegrateTwist, FuseGyro
 """
 
 from __future__ import annotations
 
+from hfg.nodes.estimation._extended import ExtendedKalmanFilter
 from hfg.nodes.estimation._kalman import AlphaBeta, KalmanFilter, correct, predict
 from hfg.nodes.estimation._odometry import (
     FuseGyro,
@@ -17,10 +19,11 @@ from hfg.nodes.estimation._odometry import (
     differential_twist,
     moved_by,
 )
-from hfg.nodes.estimation._tracks import PointTracks, Track, TrackPoints
+from hfg.nodes.estimation._tracks import PointTracks, Track, TrackPoints, cluster_detections
 
 __all__ = [
     "AlphaBeta",
+    "ExtendedKalmanFilter",
     "FuseGyro",
     "IntegrateTwist",
     "KalmanFilter",
@@ -30,6 +33,7 @@ __all__ = [
     "TrackPoints",
     "Twist",
     "ackermann_twist",
+    "cluster_detections",
     "correct",
     "differential_twist",
     "moved_by",

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from annotated_types import Interval
+from annotated_types import Interval, Unit
 
 from hfg.geometry import PointCloud
 from hfg.nodes._extras import require
-from hfg.nodes.estimation._kalman import correct, predict
+from hfg.nodes.estimation._kalman import correct, need_positive, predict
+from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, State
 
@@ -47,10 +48,11 @@ class Track(NamedTuple):
 class _Target:
     __slots__ = ("covariance", "last", "missed", "number", "seen", "state")
 
-    def __init__(self, number: int, place: Any, stamp: float, noise: float, fastest: float) -> None:
+    def __init__(self, number: int, place: Any, stamp: float, noise: Any, fastest: float) -> None:
         self.number, self.seen, self.missed, self.last = number, 1, 0, stamp
         self.state = np.array([*place, 0.0, 0.0])
-        self.covariance = np.diag([noise**2, noise**2, (fastest / 2) ** 2, (fastest / 2) ** 2])
+        self.covariance = np.diag([0.0, 0.0, (fastest / 2) ** 2, (fastest / 2) ** 2])
+        self.covariance[:2, :2] = noise
 
     def move(self, dt: float, acceleration: float) -> None:
         """Let it move on; its acceleration is white noise."""
@@ -59,20 +61,19 @@ class _Target:
         push = np.array([[dt * dt / 2, 0], [0, dt * dt / 2], [dt, 0], [0, dt]]) * acceleration
         self.state, self.covariance = predict(self.state, self.covariance, step, push @ push.T)
 
-    def is_seen(self, point: Any, noise: float, stamp: float) -> None:
-        """Take in where it is seen."""
-        self.state, self.covariance = correct(self.state, self.covariance, point, _PLACE, noise**2 * np.eye(2))
+    def is_seen(self, point: Any, noise: Any, stamp: float) -> None:
+        """Take in where it is seen, and how sure that place is."""
+        self.state, self.covariance = correct(self.state, self.covariance, point, _PLACE, noise)
         self.seen, self.missed, self.last = self.seen + 1, 0, stamp
 
     def is_missed(self) -> None:
         """It is not seen this time."""
         self.missed += 1
 
-    def distances(self, points: Any, noise: float) -> Any:
-        """Return the squared Mahalanobis distance of each point."""
-        spread = self.covariance[:2, :2] + noise**2 * np.eye(2)
+    def distances(self, points: Any, noise: Any) -> Any:
+        """Return the squared Mahalanobis distance of each point, which has a covariance of its own."""
         off = points - self.state[:2]
-        return (off * np.linalg.solve(spread, off.T).T).sum(1)
+        return (off * np.linalg.solve(self.covariance[:2, :2] + noise, off[..., None])[..., 0]).sum(1)
 
 
 class PointTracks:
@@ -88,7 +89,7 @@ class PointTracks:
         points: Any,
         stamp: float,
         *,
-        noise: float = 0.1,
+        noise: Any = 0.1,
         acceleration: float = 2.0,
         gate: float = 3.0,
         fastest: float = 3.0,
@@ -101,7 +102,7 @@ class PointTracks:
         Args:
           points: finite, n x 2.
           stamp: when.
-          noise: of a point.
+          noise: standard deviation of a point, or a covariance for each, n x 2 x 2.
           acceleration: of a target.
           gate: how far off a point may be, in standard deviations.
           fastest: of a target.
@@ -116,30 +117,31 @@ class PointTracks:
             raise ValueError(
                 f"measurements come in the order of their stamps, got {stamp:.3f} s after {self._stamp:.3f} s"
             )
+        spreads = noise if np.ndim(noise) else np.broadcast_to(noise**2 * np.eye(2), (len(points), 2, 2))
         dt = stamp - self._stamp if self._targets else 0.0
         self._stamp = stamp
         for one in self._targets:
             one.move(dt, acceleration)
         free = np.ones(len(points), bool)
-        pairs = self._assigned(points, noise, gate)
+        pairs = self._assigned(points, spreads, gate)
         for target in self._targets:
             at = pairs.get(target.number)
             if at is None:
                 target.is_missed()
             else:
                 free[at] = False
-                target.is_seen(points[at], noise, stamp)
+                target.is_seen(points[at], spreads[at], stamp)
         # a target that was not sent yet must not be missed
         kept = [
             one for one in self._targets if stamp - one.last <= forget_s and (one.seen >= confirm or not one.missed)
         ]
-        for place in points[free]:
-            kept.append(_Target(self._next, place, stamp, noise, fastest))
+        for place, spread in zip(points[free], spreads[free], strict=True):
+            kept.append(_Target(self._next, place, stamp, spread, fastest))
             self._next += 1
         self._targets = kept
         return [_told(one, still) for one in kept if one.seen >= confirm]
 
-    def _assigned(self, points: Any, noise: float, gate: float) -> dict[int, int]:
+    def _assigned(self, points: Any, noise: Any, gate: float) -> dict[int, int]:
         """Return which point belongs to which target: together as near as can be, and none outside of the gate."""
         if not (len(points) and self._targets):
             return {}
@@ -168,7 +170,8 @@ class TrackPoints(Node):
     and Data Association (1988).
 
     Attributes:
-      noise: standard deviation of a detection in each direction.
+      noise: standard deviation of a detection in each direction, unless the detections have the fields "cov_xx",
+        "cov_xy" and "cov_yy", as those of `cluster_detections` have.
       acceleration: standard deviation of a target's acceleration.
       gate: how far off a detection may be, in standard deviations.
       fastest: of a target that is seen for the first time.
@@ -179,7 +182,7 @@ class TrackPoints(Node):
       tracks: by number, including targets that were just missed.
 
     Raises:
-      ValueError: coordinates are not finite, or a stamp lies before the last one.
+      ValueError: coordinates are not finite, a covariance is singular, or a stamp lies before the last one.
     """
 
     noise = Parameter(0.1, Interval(ge=1e-3, le=100), unit="m")
@@ -201,7 +204,7 @@ class TrackPoints(Node):
             return self.known.update(
                 detections.points[:, :2],
                 detections.stamp,
-                noise=self.noise,
+                noise=_spreads(detections, self.noise),
                 acceleration=self.acceleration,
                 gate=self.gate,
                 fastest=self.fastest,
@@ -209,3 +212,77 @@ class TrackPoints(Node):
                 forget_s=self.forget_s,
                 still=self.still,
             )
+
+
+_FIELDS = ("cov_xx", "cov_xy", "cov_yy")
+
+
+def _spreads(detections: PointCloud, noise: float) -> Any:
+    """Return the covariance of each detection, or the standard deviation of all."""
+    if not all(name in detections.fields for name in _FIELDS):
+        return noise
+    xx, xy, yy = (detections.fields[name].astype(np.float64) for name in _FIELDS)
+    spreads = np.stack([xx, xy, xy, yy], 1).reshape(-1, 2, 2)
+    with np.errstate(all="ignore"):
+        sound = np.isfinite(spreads).all((1, 2)) & (xx > 0) & (xx * yy - xy * xy > 0)
+    if not sound.all():
+        need_positive(spreads[~sound][0])
+    return spreads
+
+
+@node
+def cluster_detections(
+    labelled: PointCloud,
+    *,
+    noise: Annotated[float, Interval(ge=1e-3, le=100), Unit("m")] = 0.05,
+    share: Annotated[float, Interval(ge=0, le=100), Unit("1")] = 0.25,
+    height: Annotated[float, Interval(ge=0), Unit("m")] = math.inf,
+    width: Annotated[float, Interval(ge=0), Unit("m")] = math.inf,
+) -> PointCloud:
+    """Turn clusters into detections with covariances, for `TrackPoints`: one for each cluster, at its centre.
+
+    Fires once per cloud. The covariance of a detection is that of the laser plus a share of that of the points, because
+    a laser sees one side of a thing, and its middle is less sure the larger it is. The extent counts as in M. Feldmann
+    et al., Tracking of Extended Objects and Group Targets Using Random Matrices, IEEE Transactions on Signal Processing
+    59 (2011).
+
+    Args:
+      labelled: as `clouds.cluster_points` sends it: with the number of each point's cluster in the field "cluster", and
+        -1 for none. Use a frame that does not move.
+      noise: standard deviation of a centre, however small the cluster.
+      share: of the covariance of the points.
+      height: clusters that are higher are left out, such as walls and trunks.
+      width: clusters that are longer along x or y are left out.
+
+    Returns:
+      out: in the plane, in the order of the numbers, with the fields "cov_xx", "cov_xy", "cov_yy" in square metres,
+        "cluster" and "points" (how many there are).
+
+    Raises:
+      ValueError: the cloud has no field "cluster", or coordinates are not finite.
+    """
+    labelled.need_finite()
+    if "cluster" not in labelled.fields:
+        known = ", ".join(f'"{name}"' for name in labelled.fields) or "none"
+        raise ValueError(
+            f'the cloud in frame "{labelled.frame_id}" has no field "cluster", but {known}; take the output "labelled" '
+            "of clouds.cluster_points"
+        )
+    number = labelled.fields["cluster"]
+    found, label = np.unique(number, return_inverse=True)
+    order = np.argsort(label.reshape(-1), kind="stable")
+    groups = np.split(labelled.points[order], np.cumsum(np.bincount(label.reshape(-1), minlength=len(found)))[:-1])
+    rows = []
+    with np.errstate(all="ignore"):
+        for cluster, points in zip(found.tolist(), groups, strict=True):
+            size = np.ptp(points, 0) if len(points) else np.zeros(2)
+            high = size[2] if len(size) == 3 else 0.0
+            if cluster >= 0 and max(size[:2]) <= width and high <= height:
+                flat = points[:, :2]
+                middle = flat.mean(0)
+                spread = noise**2 * np.eye(2) + share * ((flat - middle).T @ (flat - middle)) / len(flat)
+                rows.append((*middle, spread[0, 0], spread[0, 1], spread[1, 1], cluster, len(flat)))
+    table = np.array(rows, np.float64).reshape(-1, 7)
+    fields: dict[str, Any] = {name: table[:, place] for place, name in enumerate(_FIELDS, 2)}
+    fields |= {"cluster": table[:, 5].astype(np.int32), "points": table[:, 6].astype(np.int32)}
+    return PointCloud(labelled.frame_id, labelled.stamp, table[:, :2], fields)

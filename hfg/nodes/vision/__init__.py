@@ -1,4 +1,4 @@
-"""What is found in pictures: people, faces, bar codes, markers, signs, chessboards, keypoints, depth.
+"""What is found in pictures: people, faces, objects, bar codes, markers, signs, chessboards, keypoints, depth.
 
 These are OpenCV's objects: each keeps a detector or a matcher that is costly to make. `hfg.nodes.cv` has its functions.
 
@@ -8,6 +8,9 @@ These are OpenCV's objects: each keeps a detector or a matcher that is costly to
     _marks         find_bullseyes, find_quadrilaterals
     _improving     EqualizeLocally
     _drawing       draw_boxes, draw_circles
+    _regions       crop_image, crop_boxes
+    _poses         marker_poses
+    _networks      DetectObjects, and its parts: image_tensor, RunNetwork, yolo_boxes, ssd_boxes
 """
 
 from __future__ import annotations
@@ -30,6 +33,16 @@ from hfg.nodes.vision._drawing import Circles, draw_boxes, draw_circles  # noqa:
 from hfg.nodes.vision._improving import EqualizeLocally  # noqa: E402
 from hfg.nodes.vision._keypoints import KeypointDetector, match_descriptors  # noqa: E402
 from hfg.nodes.vision._marks import Bullseye, find_bullseyes, find_quadrilaterals  # noqa: E402
+from hfg.nodes.vision._networks import (  # noqa: E402
+    DetectObjects,
+    Placement,
+    RunNetwork,
+    image_tensor,
+    ssd_boxes,
+    yolo_boxes,
+)
+from hfg.nodes.vision._poses import MarkerPose, marker_poses  # noqa: E402
+from hfg.nodes.vision._regions import crop_boxes, crop_image  # noqa: E402
 
 __all__ = [
     "BarcodeReader",
@@ -39,15 +52,25 @@ __all__ = [
     "CascadeDetector",
     "ChessboardFinder",
     "Circles",
+    "DetectObjects",
     "EqualizeLocally",
     "KeypointDetector",
     "MarkerDetector",
+    "MarkerPose",
     "PeopleDetector",
+    "Placement",
+    "RunNetwork",
     "StereoDepth",
+    "crop_boxes",
+    "crop_image",
     "draw_boxes",
     "draw_circles",
     "find_bullseyes",
     "find_quadrilaterals",
+    "image_tensor",
+    "marker_poses",
     "match_descriptors",
     "qr_code",
+    "ssd_boxes",
+    "yolo_boxes",
 ]
