@@ -95,14 +95,7 @@ def _refusal(
 
 def _add_checks() -> None:
     """Implement `hooks.add_checks`: the module adds its own when it is imported."""
-    import hfg.activity.analysis  # noqa: F401
-
-
-def _watch_facts(run: Any) -> None:
-    """Implement `hooks.watch_facts`."""
-    from hfg.monitors.facts import watch_facts
-
-    watch_facts(run)
+    import hfg.analysis.checks  # noqa: F401
 
 
 def _states(graph: Any) -> Any:
@@ -112,24 +105,23 @@ def _states(graph: Any) -> Any:
     return analyse_activity(graph).diagram().graph()
 
 
-def _monitor(run: Run, whole: Whole) -> None:
-    """Implement `hooks.monitor`; monitors are imported only if there is one, now or after an edit."""
+def _judge(run: Run, whole: Whole) -> None:
+    """Implement `hooks.judge`; its code is imported only if there is something to judge by, now or after an edit."""
 
     def judge() -> None:
         from hfg.monitors.judging import judge
 
         judge(run, whole)
 
-    if whole.monitors:
+    if whole.monitors or whole.facts:
         judge()
     else:
-        whole.on_monitors = judge
+        whole.on_laws = judge
 
 
 hooks.add_checks = _add_checks
-hooks.monitor = _monitor
+hooks.judge = _judge
 hooks.states = _states
-hooks.watch_facts = _watch_facts
 hooks.refusal = _refusal
 hooks.distribute = _distribute
 hooks.studio = _studio

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
@@ -67,11 +67,16 @@ class Code:
                 yield name, handler.unknown
 
 
-def some_of(names: Iterable[str]) -> frozenset[Bag]:
-    """Each subset of ports: which values are None is not known."""
+def free(port: str) -> list[Sent]:
+    """The sendings over a port by code that may have modifiers of its own."""
+    return [(port, None), (port, 1), (port, -1)]
+
+
+def some_of(sendings: Iterable[Collection[Sent]]) -> frozenset[Bag]:
+    """Of each port one of its sendings or none: which values are None is not known."""
     found = {NOTHING}
-    for name in names:
-        found |= {added(bag, {((name, None), 1)}) for bag in found}
+    for choices in sendings:
+        found |= {added(bag, {(sent, 1)}) for bag in found for sent in choices}
         if len(found) > MOST_BAGS:
             raise Unknown("it has too many outputs with active edges")
     return frozenset(found)

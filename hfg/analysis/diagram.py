@@ -72,7 +72,11 @@ class StateDiagram:
 
     def as_data(self) -> dict[str, Any]:
         """Return the diagram as plain data, for JSON."""
-        return {"states": [asdict(one) for one in self.states], "arrows": [asdict(one) for one in self.arrows]}
+        return {
+            "states": [asdict(one) for one in self.states],
+            "arrows": [asdict(one) for one in self.arrows],
+            "limits": dict(self.limits),
+        }
 
     def graph(self) -> Graph:
         """Return a graph that has only the states, nested as they are, to be drawn.
@@ -87,12 +91,12 @@ class StateDiagram:
 
 def diagram_of(reach: Reach) -> StateDiagram:
     """Return the state diagram of what was reached."""
-    game, bits = reach.game, reach.game.bits
-    marked = {number for number, one in enumerate(bits.one) if reach.holds(one)}
+    game, places = reach.game, reach.game.places
+    marked = {number for number, one in enumerate(places.one) if reach.holds(one)}
     entered = {game.edges[number].target.node for number in marked}
     states = [
         State(game.flat.path(index), not rests)
-        for index, bit in bits.node.items()
+        for index, bit in places.node.items()
         if (rests := reach.holds(1 << bit)) or index in entered
     ]
     arrows = [

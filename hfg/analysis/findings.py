@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator
 
-from hfg.analysis.game import Play
+from hfg.analysis.playing import Play
 from hfg.analysis.proving import StatedFact, Step, steps_to
 from hfg.analysis.reach import Reach
 from hfg.analysis.searching import Searched
@@ -74,7 +74,7 @@ def _stuck(reach: Reach, play: Play, found: Searched) -> list[Problem]:
     kept: list[str] = []
     for state in found.reached:
         if state & play.mask and next(play.steps_from(state), None) is None:
-            kept += [path for path in game.active_in(state) if path not in kept]
+            kept += [path for path in game.places.active_in(state) if path not in kept]
     return [
         Problem(
             path=path,
@@ -100,7 +100,7 @@ def leaves_within(reach: Reach) -> dict[str, float]:
             continue
         for index in game.flat.members(end):
             path = game.flat.path(index)
-            if index in game.bits.node and reach.may_be_active(index):
+            if index in game.places.node and reach.may_be_active(index):
                 found[path] = min(options.active_for_s, found.get(path, options.active_for_s))
     return found
 
@@ -144,7 +144,7 @@ def _half_active_slots(reach: Reach) -> list[Problem]:
         if edge.active or not active[edge.target.node, edge.target.name] or edge.target.node <= ROOT:
             continue
         members = game.flat.members(edge.source.node) if edge.source.node != ROOT else []
-        if edge.source.name != "deactivated" and any(index in game.bits.node for index in members):
+        if edge.source.name != "deactivated" and any(index in game.places.node for index in members):
             problems.append(
                 Problem(
                     path=edge.label,
@@ -196,7 +196,7 @@ def _ungated(reach: Reach) -> list[Problem]:
             into.setdefault((edge.target.node, edge.target.name), []).append(edge.source.node)
     found: dict[int, int] = {}
     for sources in into.values():
-        without = [index for index in sources if index not in gated and index in game.bits.node]
+        without = [index for index in sources if index not in gated and index in game.places.node]
         held_back = [index for index in sources if index in gated]
         if len(without) == 1 and len(held_back) == len(sources) - 1 > 1:
             found[without[0]] = len(sources) - 1

@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from hfg.analysis.game import Game, Kind, Play
+from hfg.analysis.game import Game
+from hfg.analysis.playing import Play
+from hfg.analysis.rules import Kind
 from hfg.analysis.searching import Searched, pairs_together
 from hfg.graph.flat import ROOT
 from hfg.graph.structure.facts import Claim
@@ -154,7 +156,7 @@ def verdict(play: Play, found: Searched, nodes: Iterable[int], claim: Claim, fac
     nodes = sorted(nodes)
     paths = tuple(game.flat.path(index) for index in nodes)
     whole = play.nodes.issubset(nodes)
-    mask = play.mask if whole else game.places_of(nodes)
+    mask = play.mask if whole else game.places.counting(nodes)
     kept = claim == "at most one" or (whole and not any(rule.may_lose for rule in play.rules) and play.first != 0)
     if kept and _counts(play):
         return Verdict(claim, paths, True, "counting")
@@ -194,6 +196,6 @@ def steps_to(game: Game, found: Searched, state: int) -> Iterator[Step]:
             takes=game.edges[rule.take].label if rule.take >= 0 else "",
             sends=rule.sent,
             kind=rule.kind,
-            active=tuple(game.active_in(after)),
-            under_way=tuple(game.under_way_in(after)),
+            active=tuple(game.places.active_in(after)),
+            under_way=tuple(game.places.under_way_in(after)),
         )

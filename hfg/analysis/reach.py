@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from typing import Final
 
-from hfg.analysis.game import Game, Play
+from hfg.analysis.game import Game
+from hfg.analysis.playing import Play
 from hfg.analysis.proving import Verdict, regions_of, verdict
 from hfg.analysis.searching import Premise, Searched, pairs_together, search
 from hfg.graph.flat import FlatGraph, scope_end
@@ -51,13 +52,13 @@ class Reach:
         if None in ends:
             return frozenset()
         inside = {index for end in ends if end is not None for index in self.game.flat.members(end)}
-        return frozenset(inside.intersection(self.game.bits.node))
+        return frozenset(inside.intersection(self.game.places.node))
 
     def _premises(self, play: Play) -> list[Premise]:
         """The facts as far as they are about nodes of a play."""
         found = []
         for number, (fact, chosen) in enumerate(self.facts):
-            mask = self.game.places_of(chosen & play.nodes)
+            mask = self.game.places.counting(chosen & play.nodes)
             if mask:
                 found.append(Premise(number, mask, fact.claim == "exactly one" and chosen <= play.nodes))
         return found
@@ -92,7 +93,7 @@ class Reach:
     def may_be_active(self, index: int) -> bool:
         """Return whether a node may ever hold activity, or activity be in transit to it."""
         number = self._play_of(index)
-        return number is not None and self.is_marked(number, self.game.places_of([index]))
+        return number is not None and self.is_marked(number, self.game.places.counting([index]))
 
     def is_marked(self, number: int, mask: int) -> bool:
         """Return whether one of some places of a region may ever hold activity."""
@@ -112,7 +113,7 @@ class Reach:
             return False
         if one != other:
             return self.may_be_active(first) and self.may_be_active(second)
-        masks = self.game.places_of([first]), self.game.places_of([second])
+        masks = self.game.places.counting([first]), self.game.places.counting([second])
         found = self.found[one]
         if any(state & masks[0] and state & masks[1] for state in found.reached):
             return True

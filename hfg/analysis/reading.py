@@ -9,11 +9,13 @@ ports may be sent, any number of times. Depends on `walking`.
 from __future__ import annotations
 
 import functools
+from itertools import chain
 from typing import Final
 
-from hfg.analysis.bags import MANY, NOTHING, Bag, Code, Handler, Sent, Unknown, loosened, some_of
+from hfg.analysis.bags import MANY, NOTHING, Bag, Code, Handler, Sent, Unknown, free, loosened, some_of
 from hfg.analysis.sources import function_of
 from hfg.analysis.walking import Walk
+from hfg.analysis.words import makes_tokens
 from hfg.nodetypes.description import NodeType
 
 OUTSIDE: Final = ("setup", "ready", "teardown", "on_activated", "do")
@@ -30,10 +32,12 @@ def read(kind: NodeType, ports: frozenset[str]) -> Code:
 def of_function(kind: NodeType, ports: frozenset[str]) -> Handler:
     """A function reaches no ports but by what it returns."""
     whole = "async" not in kind.process_kind
+    is_free = makes_tokens(kind) or any(one.token for one in kind.inputs.values())
+    sendings = [free(name) if is_free else [(name, None)] for name in kind.outputs if name in ports]
     try:
-        return Handler(some_of(name for name in kind.outputs if name in ports), whole)
+        return Handler(some_of(sendings), whole)
     except Unknown as why:
-        return Handler(frozenset({NOTHING, frozenset(((name, None), 1) for name in kind.outputs)}), False, str(why))
+        return Handler(frozenset({NOTHING, frozenset((sent, 1) for sent in chain(*sendings))}), False, str(why))
 
 
 class _Type(Walk):
@@ -68,7 +72,7 @@ class _Type(Walk):
                 at_once |= sent
         if self.lost:
             return self._all_unknown(self.lost)
-        loose = {sent for name in self.loose for sent in self._sendings(name, None)} | at_once | afterwards
+        loose = {sent for name in self.loose & self.ports for sent in self._unseen(name)} | at_once | afterwards
         if loose:
             outside |= loose
             firing = firing and loosened(firing, loose)
@@ -87,8 +91,8 @@ class _Type(Walk):
         )
 
     def _anything(self) -> frozenset[Bag]:
-        modifiers = (None, 1, -1) if self.frees else (None,)
-        return frozenset(frozenset({((name, one), MANY)}) for name in self.ports for one in modifiers) | {NOTHING}
+        unseen = (sent for name in self.ports for sent in self._unseen(name))
+        return frozenset(frozenset({(sent, MANY)}) for sent in unseen) | {NOTHING}
 
     def _handler(self, name: str, runs: str, slot: str = "") -> Handler:
         function = function_of(self.kind, name)

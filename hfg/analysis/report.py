@@ -10,9 +10,9 @@ from typing import Any
 
 from hfg.analysis.diagram import StateDiagram, diagram_of
 from hfg.analysis.findings import leaves_within, problems_of, without_limit
-from hfg.analysis.game import Unread
 from hfg.analysis.proving import Region, StatedFact, Verdict
 from hfg.analysis.reach import Reach
+from hfg.analysis.rules import Unread
 from hfg.analysis.wording import data_of_fact, data_of_region, lines_of_fact, lines_of_region, names
 from hfg.base.bounds import ACTIVE_EDGES
 from hfg.errors import GraphError, Problem, UsageError
@@ -91,7 +91,7 @@ class ActivityReport:
     def states(self) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
         """Return the states reached, region by region: the active nodes, and the edges on which activity lies."""
         return [
-            (tuple(self._game.active_in(state)), tuple(self._game.under_way_in(state)))
+            (tuple(self._game.places.active_in(state)), tuple(self._game.places.under_way_in(state)))
             for found in self._reach.found
             for state in found.reached
         ]
@@ -139,7 +139,7 @@ class ActivityReport:
     def _verdict(self, nodes: Iterable[Node | str], claim: Claim) -> Verdict:
         chosen: set[int] = set()
         for node in nodes:
-            touched = [index for index in self._indices(node) if index in self._game.bits.node]
+            touched = [index for index in self._indices(node) if index in self._game.places.node]
             if not touched:
                 path = node if isinstance(node, str) else node.place.path
                 raise GraphError(f'no active edge touches "{path}", so it is never active: leave it out')
@@ -166,7 +166,7 @@ class ActivityReport:
             )
         return Region(
             nodes=tuple(self._game.flat.path(index) for index in sorted(play.nodes)),
-            begins=sum(1 for one in self._game.start if self._game.bits.one[one] & play.mask),
+            begins=sum(1 for one in self._game.start if self._game.places.one[one] & play.mask),
             at_most_one=at_most,
             exactly_one=exactly,
             states=len(found.reached),

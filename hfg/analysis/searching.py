@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-from hfg.analysis.game import Play, Rule, singles
+from hfg.analysis.places import singles
+from hfg.analysis.playing import Play
+from hfg.analysis.rules import Rule
 
 __all__ = ["Premise", "Searched", "pairs_together", "search"]
 
@@ -90,7 +92,7 @@ def pairs_together(play: Play) -> dict[int, int]:
     A place that is in its own set may hold two tokens. Places of the right of A3 take part, those of -1 do not: they
     take activity away, and what is left out then only makes the relation larger.
     """
-    bits = play.game.bits
+    bits = play.game.places
     steps: list[tuple[int, list[int]]] = []  # from a place, to places
     free: list[list[int]] = []  # what appears by itself
     for rule in play.rules:
@@ -116,7 +118,7 @@ def pairs_together(play: Play) -> dict[int, int]:
 
 def _first_bits(play: Play) -> int:
     """The bits that stand for a place: not those that say that there are several."""
-    return ~sum(play.game.bits.two)
+    return ~sum(play.game.places.two)
 
 
 def _closed(play: Play, steps: list[tuple[int, list[int]]], free: list[list[int]]) -> dict[int, int]:
@@ -138,7 +140,7 @@ def _closed(play: Play, steps: list[tuple[int, list[int]]], free: list[list[int]
                 for low in singles(new):
                     together[low] = together.get(low, 0) | place
 
-    bits = play.game.bits
+    bits = play.game.places
     first = [bits.one[number] for number in play.game.start if bits.one[number] & play.mask]
     mark(first, 0)
     while changed:

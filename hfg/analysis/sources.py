@@ -8,10 +8,10 @@ import functools
 import inspect
 import linecache
 import types
-from collections.abc import Iterator
 from typing import Any, Final
 
 from hfg.analysis.bags import Unknown
+from hfg.analysis.words import words
 from hfg.nodetypes.description import NodeType
 from hfg.nodetypes.node import Node
 
@@ -129,23 +129,3 @@ def code_of(value: Any) -> list[types.FunctionType]:
     if isinstance(value, type) and not issubclass(value, Node):
         return [one for one in map(plain, vars(value).values()) if one is not None]
     return []
-
-
-def words(code: types.CodeType) -> Iterator[str]:
-    """Yield the names and texts in a function and in those inside it."""
-    yield from code.co_names
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            yield from words(constant)
-        elif isinstance(constant, str):
-            yield constant
-
-
-def speaks_of_tokens(kind: NodeType) -> bool:
-    """Whether the code makes tokens, which bring modifiers of their own (rule A4)."""
-    for owner in kind.origin.__mro__:
-        if owner not in (Node, object):
-            for function in functions_in(owner):
-                if isinstance(function, types.FunctionType) and "Token" in words(function.__code__):
-                    return True
-    return False

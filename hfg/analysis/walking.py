@@ -1,6 +1,6 @@
 """Walks the syntax tree of a method along every way through it, and collects the bags that it may send.
 
-Conditions are not looked at. Depends on `bags` and `sources`.
+Conditions are not looked at. Depends on `statements`, `port_names` and `words`.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ import ast
 import builtins
 import inspect
 import types
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Any, Final
+from collections.abc import Callable
+from typing import Any, Final, Literal, TypeAlias
 
-from hfg.analysis.bags import NOTHING, Bag, Sent, Unknown, Ways, after, either, parts, product, some_of
+from hfg.analysis.bags import NOTHING, Bag, Sent, Unknown, free, product, some_of
+from hfg.analysis.port_names import HANDS_ON, PortNames
 from hfg.analysis.sources import (
     SENDS,
     above,
@@ -23,31 +23,21 @@ from hfg.analysis.sources import (
     own,
     plain,
     resolved,
-    speaks_of_tokens,
     tree_of,
 )
+from hfg.analysis.statements import Scope, Statements
+from hfg.analysis.words import makes_tokens, sets_modifiers
 from hfg.nodetypes.description import NodeType
 from hfg.nodetypes.node import Node
 
+Modifier: TypeAlias = Literal[0, 1, -1, "any"] | None
+"""An explicit modifier (rule A4); "any" if it is not known which, None if there is none."""
+
 DEEPEST: Final = 12
 HARMLESS: Final = frozenset({"isinstance", "id", "type", "repr", "str", "hash", "print", "len", "format"})
-HANDS_ON: Final = frozenset({"enumerate", "zip", "list", "tuple", "reversed", "range", "len", "min", "max", "sorted"})
 
 
-@dataclass
-class Scope:
-    """The function that is being read."""
-
-    function: types.FunctionType
-    owner: type
-    me: str
-    names: dict[str, frozenset[str]]
-    is_process: bool
-    depth: int
-    awaited: bool
-
-
-class Walk:
+class Walk(Statements):
     """Walks through the methods of one class.
 
     Attributes:
@@ -62,7 +52,7 @@ class Walk:
         self.kind = kind
         self.ports = ports
         self.outputs = frozenset(kind.outputs)
-        self.sending = frozenset((*kind.outputs, *kind.events))
+        self._ports = PortNames(kind)
         self.loose: set[str] = set()  # ports that reach where they cannot be followed
         self.later: set[str] = set()  # methods that something else may call
         self.lost = ""  # why the node itself cannot be followed
@@ -70,19 +60,20 @@ class Walk:
         self.inline: set[str] = set()  # methods that a handler gave away, which may be called at once
         takes_token = any(one.token for one in kind.inputs.values())
         takes_token |= any(one.token for one in kind.slots.values())
-        self.frees = takes_token or speaks_of_tokens(kind)  # a sending may have a modifier of its own
+        self.frees = takes_token or makes_tokens(kind)  # what is sent may be a token with a modifier of its own
+        self.tells = self.frees or sets_modifiers(kind)
 
-    def _sendings(self, port: str, modifier: ast.expr | None) -> list[Sent]:
-        """The possible modifiers of one sending over a port."""
-        if port not in self.ports:
+    def _sendings(self, port: str, modifier: Modifier = None) -> list[Sent]:
+        """The possible sendings over a port with an explicit modifier, or without one."""
+        if port not in self.ports or modifier == 0:
             return []
-        if modifier is None:
-            return [(port, None), (port, 1), (port, -1)] if self.frees else [(port, None)]
-        try:
-            given = ast.literal_eval(modifier)
-        except ValueError:
-            return [(port, None), (port, 1), (port, -1)]
-        return [] if given == 0 else [(port, given)] if given in (1, -1) else [(port, None)]
+        if modifier == "any" or (modifier is None and self.frees):
+            return free(port)
+        return [(port, modifier)]
+
+    def _unseen(self, port: str) -> list[Sent]:
+        """The possible sendings over a port by code that is not followed."""
+        return free(port) if self.tells else self._sendings(port)
 
     # --- functions
 
@@ -95,7 +86,7 @@ class Walk:
         owner = next((one for one in self._mro() if function in functions_in(one)), self.kind.origin)
         arguments = [*tree.args.posonlyargs, *tree.args.args]
         me = arguments[0].arg if arguments else ""
-        names = self._aliases(tree, me)
+        names = self._ports.aliases(tree, me)
         scope = Scope(function, owner, me, names, is_process, depth, awaited)
         ways = self._block(tree.body, scope)
         return set().union(*ways.values()) or {NOTHING}
@@ -103,167 +94,6 @@ class Walk:
     def _mro(self) -> tuple[type, ...]:
         origin: type = self.kind.origin
         return origin.__mro__
-
-    def _aliases(self, tree: ast.AST, me: str) -> dict[str, frozenset[str]]:
-        """Local names that may stand for ports."""
-        found: dict[str, set[str]] = {}
-        for one in ast.walk(tree):
-            pairs: list[tuple[ast.expr, ast.expr]] = []
-            if isinstance(one, ast.Assign):
-                pairs = [(target, one.value) for target in one.targets]
-            elif isinstance(one, ast.AnnAssign | ast.NamedExpr) and one.value is not None:
-                pairs = [(one.target, one.value)]
-            elif isinstance(one, ast.For | ast.AsyncFor | ast.comprehension):
-                pairs = [(one.target, one.iter)]
-            for target, value in pairs:
-                ports = self._ports_handed_on(value, me)
-                for name in [part.id for part in ast.walk(target) if isinstance(part, ast.Name)] if ports else []:
-                    found.setdefault(name, set()).update(ports)
-        return {name: frozenset(ports) for name, ports in found.items()}
-
-    def _ports_handed_on(self, value: ast.expr, me: str) -> set[str]:
-        """The ports that the value of an expression may be, or contain."""
-        port = self._port(value, me, {})
-        if port:
-            return set(port)
-        parts: list[ast.expr] = []
-        match value:
-            case ast.IfExp():
-                parts = [value.body, value.orelse]
-            case ast.BoolOp():
-                parts = value.values
-            case ast.Tuple() | ast.List():
-                parts = value.elts
-            case ast.Call(func=ast.Name(id=name)) if name in HANDS_ON:
-                parts = value.args
-            case ast.Subscript() | ast.Starred():
-                parts = [value.value]
-        return set().union(*(self._ports_handed_on(part, me) for part in parts))
-
-    def _port(self, one: ast.expr, me: str, names: dict[str, frozenset[str]]) -> frozenset[str]:
-        """The ports that an expression may be, such as `self.done`, `self.ways[number]`, a local name."""
-        if isinstance(one, ast.Name):
-            return names.get(one.id, frozenset())
-        if isinstance(one, ast.IfExp):
-            first, second = self._port(one.body, me, names), self._port(one.orelse, me, names)
-            return first | second if first and second else frozenset()
-        if isinstance(one, ast.Subscript):
-            name = own(one.value, me)
-            if name in self.kind.vectors and isinstance(one.slice, ast.Constant):
-                element = f"{name}[{one.slice.value!r}]"
-                return frozenset({element}) & self.sending
-            inner = one.value
-            group = inner.attr if isinstance(inner, ast.Attribute) and own(inner.value, me) == "ports" else ""
-            if group in ("events", "outputs"):
-                return self.sending  # which one is not known, but it is one
-            return self._port(one.value, me, names)
-        if isinstance(one, ast.Call) and own(one.func, me) == "_port":
-            return self.sending
-        name = own(one, me)
-        if name is None:
-            return frozenset()
-        if name in self.kind.vectors:
-            return frozenset(port for port in self.sending if port.startswith(f"{name}["))
-        return frozenset({name}) & self.sending
-
-    # --- statements
-
-    def _block(self, statements: Iterable[ast.stmt], scope: Scope) -> Ways:
-        found: Ways = {}
-        now: set[Bag] = {NOTHING}
-        for statement in statements:
-            ways = after(now, self._statement(statement, scope))
-            now = ways.pop("next", set())
-            found = either(found, ways)
-            if not now:
-                return found
-        return either(found, {"next": now})
-
-    def _statement(self, one: ast.stmt, scope: Scope) -> Ways:
-        handle = _STATEMENTS.get(type(one))
-        if handle is not None:
-            found: Ways = handle(self, one, scope)
-            return found
-        return {"next": self._all([part for part in ast.iter_child_nodes(one) if isinstance(part, ast.expr)], scope)}
-
-    def _return(self, one: ast.Return, scope: Scope) -> Ways:
-        return {"return": product(self._value(one.value, scope), self._returned(one.value, scope))}
-
-    def _raise(self, one: ast.Raise, scope: Scope) -> Ways:
-        return {"raise": self._all([one.exc, one.cause], scope)}
-
-    def _jump(self, one: ast.Break | ast.Continue, scope: Scope) -> Ways:
-        return {"break" if isinstance(one, ast.Break) else "continue": {NOTHING}}
-
-    def _if(self, one: ast.If, scope: Scope) -> Ways:
-        choice = either(self._block(one.body, scope), self._block(one.orelse, scope))
-        return after(self._value(one.test, scope), choice)
-
-    def _while(self, one: ast.While, scope: Scope) -> Ways:
-        loop = self._loop(after(self._value(one.test, scope), self._block(one.body, scope)))
-        broken = loop.pop("broken", set())
-        if isinstance(one.test, ast.Constant) and one.test.value:
-            del loop["next"]
-            return {**loop, "next": broken} if broken else loop
-        loop["next"] |= broken
-        return after(self._value(one.test, scope), loop)
-
-    def _for(self, one: ast.For | ast.AsyncFor, scope: Scope) -> Ways:
-        loop = self._loop(self._block(one.body, scope))
-        loop["next"] |= loop.pop("broken", set())
-        loop = either(
-            {key: bags for key, bags in loop.items() if key != "next"},
-            after(loop["next"], self._block(one.orelse, scope)),
-            {"next": loop["next"]},
-        )
-        return after(self._value(one.iter, scope), loop)
-
-    def _with(self, one: ast.With | ast.AsyncWith, scope: Scope) -> Ways:
-        before = self._all([item.context_expr for item in one.items], scope)
-        ways = self._block(one.body, scope)
-        return after(before, either(ways, {"next": parts(ways)}))  # a context may swallow an exception
-
-    def _match(self, one: ast.Match, scope: Scope) -> Ways:
-        cases = [after(self._all([case.guard], scope), self._block(case.body, scope)) for case in one.cases]
-        return after(self._value(one.subject, scope), either({"next": {NOTHING}}, *cases))
-
-    def _define(self, one: ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef, scope: Scope) -> Ways:
-        self._nested(one, scope)
-        return {"next": {NOTHING}}
-
-    def _assign(self, one: ast.Assign | ast.AnnAssign, scope: Scope) -> Ways:
-        targets = one.targets if isinstance(one, ast.Assign) else [one.target]
-        is_local = all(isinstance(target, ast.Name) for target in targets)
-        value = self._value(one.value, scope, aliased=is_local)
-        return {"next": product(value, self._all([t for t in targets if not isinstance(t, ast.Name)], scope))}
-
-    def _loop(self, body: Ways) -> Ways:
-        """None, once or often."""
-        once = body.get("next", set()) | body.get("continue", set())
-        often: set[Bag] = {NOTHING}
-        while (more := often | product(often, once)) != often if once else False:
-            often = more
-        found: Ways = {exit_: product(often, body[exit_]) for exit_ in ("return", "raise") if exit_ in body}
-        if "break" in body:
-            found["broken"] = product(often, body["break"])
-        return {**found, "next": often}
-
-    def _try(self, one: ast.Try | ast.TryStar, scope: Scope) -> Ways:
-        body = self._block(one.body, scope)
-        failed = parts(body)
-        whole = either({key: bags for key, bags in body.items() if key != "next"})
-        if "next" in body:
-            whole = either(whole, after(body["next"], self._block(one.orelse, scope)))
-        ways = either(whole, *(after(failed, self._block(handler.body, scope)) for handler in one.handlers))
-        if one.finalbody:
-            last = self._block(one.finalbody, scope)
-            leaves = {exit_: bags for exit_, bags in last.items() if exit_ != "next"}
-            ends = set().union(*ways.values())
-            ways = either(
-                *({exit_: product(bags, last["next"])} for exit_, bags in ways.items() if "next" in last),
-                after(ends, leaves),
-            )
-        return ways
 
     def _returned(self, value: ast.expr | None, scope: Scope) -> frozenset[Bag]:
         """The bags that the process function sends by returning a value."""
@@ -276,16 +106,16 @@ class Walk:
             silent = [isinstance(part, ast.Constant) and part.value is None for part in value.elts]
             outputs = [name for name, none in zip(outputs, silent, strict=True) if not none]
         certain = isinstance(value, ast.Subscript | ast.Tuple | ast.List | ast.Dict | ast.JoinedStr | ast.BinOp)
-        if certain and self.kind.result == "single" and not self.kind.layout:
+        if certain and self.kind.result == "single" and not self.kind.layout and not self.frees:
             return frozenset({frozenset(((name, None), 1) for name in outputs if name in self.ports)})
-        return some_of(name for name in outputs if name in self.ports)
+        return some_of(self._sendings(name) for name in outputs if name in self.ports)
 
     def _nested(self, one: ast.AST, scope: Scope) -> None:
         """A function inside: when it runs is not known, so its ports may be sent whenever."""
         for part in ast.walk(one):
             if not isinstance(part, ast.expr):
                 continue
-            self.loose |= self._port(part, scope.me, scope.names)
+            self.loose |= self._ports.port(part, scope.me, scope.names)
             name = own(part, scope.me)
             if name is not None and function_of(self.kind, name) is not None:
                 self.later.add(name)
@@ -296,12 +126,6 @@ class Walk:
 
     # --- expressions
 
-    def _all(self, parts: Iterable[ast.expr | None], scope: Scope) -> set[Bag]:
-        found = {NOTHING}
-        for part in parts:
-            found = product(found, self._value(part, scope))
-        return found
-
     def _value(self, one: ast.expr | None, scope: Scope, *, aliased: bool = False) -> set[Bag]:
         """The bags that are sent while an expression is evaluated."""
         if one is None:
@@ -310,7 +134,7 @@ class Walk:
         if handle is not None:
             found: set[Bag] = handle(self, one, scope, aliased)
             return found
-        ports = self._port(one, scope.me, scope.names)
+        ports = self._ports.port(one, scope.me, scope.names)
         if ports:
             if not aliased:
                 self.loose |= ports  # where it goes is not followed
@@ -359,7 +183,7 @@ class Walk:
         return product(self._all([one.value], scope), sent)
 
     def _yield_from(self, one: ast.YieldFrom, scope: Scope, aliased: bool) -> set[Bag]:
-        sent = some_of(name for name in self.outputs if name in self.ports)
+        sent = some_of(self._sendings(name) for name in self.outputs if name in self.ports)
         return product(self._all([one.value], scope), sent)
 
     def _attribute(self, name: str, scope: Scope) -> set[Bag]:
@@ -382,14 +206,14 @@ class Walk:
         inner = [generator.iter for generator in one.generators[1:]]
         often = self._loop({"next": self._all([*inner, *conditions, *values], scope)})["next"]
         before = {NOTHING}
-        if not self._ports_handed_on(one.generators[0].iter, scope.me):
+        if not self._ports.handed_on(one.generators[0].iter, scope.me):
             before = self._value(one.generators[0].iter, scope)
         return product(before, often)
 
     def _call(self, one: ast.Call, scope: Scope, aliased: bool) -> set[Bag]:
         function = one.func
         if isinstance(function, ast.Attribute) and function.attr in SENDS:
-            ports = self._port(function.value, scope.me, scope.names)
+            ports = self._ports.port(function.value, scope.me, scope.names)
             if ports:
                 return self._sending(one, function.value, ports, scope)
         arguments = [*one.args, *(keyword.value for keyword in one.keywords)]
@@ -407,11 +231,11 @@ class Walk:
         """The bags of `self.port.trigger(...)`, over one of these ports."""
         inside = over.slice if isinstance(over, ast.Subscript) else None
         before = self._all([inside, *one.args, *(keyword.value for keyword in one.keywords)], scope)
-        modifier = next((keyword.value for keyword in one.keywords if keyword.arg == "activity"), None)
+        modifier = _modifier(one)
         sent: set[Bag] = set()
         for port in ports:
             sent |= {frozenset({(sending, 1)}) for sending in self._sendings(port, modifier)} or {NOTHING}
-        if modifier is not None and not isinstance(modifier, ast.Constant | ast.UnaryOp):
+        if modifier == "any":
             sent.add(NOTHING)  # it may be 0
         return product(before, sent)
 
@@ -451,27 +275,20 @@ class Walk:
             raise Unknown(f"it hands the node to {name}")
 
 
-_STATEMENTS: Final[dict[type[ast.stmt], Callable[..., Ways]]] = {
-    ast.Return: Walk._return,
-    ast.Raise: Walk._raise,
-    ast.Break: Walk._jump,
-    ast.Continue: Walk._jump,
-    ast.If: Walk._if,
-    ast.While: Walk._while,
-    ast.For: Walk._for,
-    ast.AsyncFor: Walk._for,
-    ast.With: Walk._with,
-    ast.AsyncWith: Walk._with,
-    ast.Try: Walk._try,
-    ast.TryStar: Walk._try,
-    ast.Match: Walk._match,
-    ast.FunctionDef: Walk._define,
-    ast.AsyncFunctionDef: Walk._define,
-    ast.ClassDef: Walk._define,
-    ast.Assign: Walk._assign,
-    ast.AnnAssign: Walk._assign,
-}
-"""What reads each kind of statement; of all others only the expressions in them matter."""
+def _modifier(call: ast.Call) -> Modifier:
+    """Read the modifier of a sending."""
+    for keyword in call.keywords:
+        if keyword.arg is None:
+            return "any"  # as in trigger(value, **options)
+        if keyword.arg == "activity":
+            try:
+                given = ast.literal_eval(keyword.value)
+            except ValueError:
+                return "any"
+            return given if given in (0, 1, -1) else None
+    return None
+
+
 _EXPRESSIONS: Final[dict[type[ast.expr], Callable[..., set[Bag]]]] = {
     ast.Constant: Walk._constant,
     ast.Name: Walk._name,

@@ -20,9 +20,8 @@ class _Hooks:
       visit_studio: `hfg.studio.local.visit`, for other programs of the same user that steer a run.
       refusal: why a graph file may not name these references of node types and operators, references in values, or
         types, given which packages are allowed in addition; None if it may.
-      watch_facts: `hfg.monitors.facts.watch_facts`, which lets a debug run check the facts of its graph.
       states: the state diagram of a graph, as a graph that is drawn.
-      monitor: `hfg.monitors.judging.judge`, which begins to judge a run by the monitors of its graph.
+      judge: `hfg.monitors.judging.judge`, which begins to judge a run by the monitors and facts of its graph.
       add_checks: adds the checks of graphs that upper layers have, once.
     """
 
@@ -33,9 +32,8 @@ class _Hooks:
     visit_studio: Callable[..., Any]
     refusal: Callable[[Iterable[str], Iterable[str], Iterable[str], Iterable[str]], str | None]
     states: Callable[[Any], Any]
-    watch_facts: Callable[[Any], None]
     add_checks: Callable[[], None]
-    monitor: Callable[[Any, Any], None]
+    judge: Callable[[Any, Any], None]
 
 
 hooks = _Hooks()

@@ -23,13 +23,9 @@ __all__ = ["watch_facts"]
 _STRETCH: Final = 16
 
 
-def watch_facts(run: Any) -> None:
-    """Let a debug run fail when a fact about its graph is violated; other runs do not look.
-
-    Facts about nodes that lie in other processes are not checked here.
-    """
-    if isinstance(run, Run) and run._engine.settings.debug:
-        run.trace(_Watch(run).see)
+def watch_facts(run: Run) -> None:
+    """Let a run fail when a fact about its graph is violated. Facts about nodes in other processes are not checked."""
+    run.trace(_Watch(run).see)
 
 
 class _Watch:

@@ -1,4 +1,7 @@
-"""Judges a run by the monitors that its graph declares; they follow edits. Depends on `watching`."""
+"""Judges a run by the monitors and facts that its graph declares; they follow edits.
+
+Depends on `watching` and `facts`.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from hfg.errors import HfgError, UsageError
 from hfg.graph.structure.level import Whole
 from hfg.graph.structure.monitors import node_part
 from hfg.graph.structure.options import MonitorSpec
+from hfg.monitors.facts import watch_facts
 from hfg.monitors.formulas import Sent
 from hfg.monitors.violations import Violation
 from hfg.monitors.watching import Monitors, monitors_of
@@ -36,10 +40,22 @@ def declared(run: Run) -> Monitors:
 
 
 def judge(run: Run, whole: Whole) -> None:
-    """Begin to judge a run, and follow edits; see `Whole.begin_run`."""
-    judging = _Declared(run, whole)
-    whole.on_monitors = judging.follow
-    judging.follow()
+    """Begin to judge a run by monitors, and in debug runs by facts, and follow edits; see `Whole.begin_run`."""
+    judging: _Declared | None = None
+    checks_facts = run._engine.settings.debug
+
+    def follow() -> None:
+        nonlocal judging, checks_facts
+        if whole.monitors and judging is None:
+            judging = _Declared(run, whole)
+        if judging is not None:
+            judging.follow()
+        if whole.facts and checks_facts:
+            checks_facts = False  # from now on they follow edits themselves
+            watch_facts(run)
+
+    whole.on_laws = follow
+    follow()
 
 
 class _Declared:

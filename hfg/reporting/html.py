@@ -17,31 +17,17 @@ import msgspec
 from hfg.engine import Report, Statistics
 from hfg.errors import HfgError
 from hfg.graph import Graph
-from hfg.graph.drawing.picture import picture
 from hfg.graph.drawing.text import escaped
 from hfg.monitors.watching import Monitors
+from hfg.reporting.drawn import Drawn
 from hfg.reporting.judged import budgets_section, monitors_section
 from hfg.reporting.observing import MOST_NODES, SPANS, Observed
 from hfg.reporting.pictures import png
 
 _MOST_ROWS: Final = 2000  # rows of a table
-_MOST_DRAWN: Final = 600  # nodes; in a larger graph, subgraphs are collapsed
 _RULES: Final = (
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; media-src data:"
 )
-
-
-def drawing(graph: Graph) -> tuple[str, str]:
-    """Draw a graph for a page, with no node active. Return the drawing, and what it leaves out, if anything."""
-    nodes = [one for _, one in picture(graph).items if one.look == "node"]
-    if len(nodes) <= _MOST_DRAWN:
-        return graph.draw(format="svg", active=()), ""
-    top = sum(1 for _ in graph.nodes)
-    if top > _MOST_DRAWN:
-        return "", f"the drawing, because the graph has {top:,} nodes; graph.draw makes it"
-    return graph.draw(
-        format="svg", depth=0, active=()
-    ), f"the insides of subgraphs, because there are {len(nodes):,} nodes in all"
 
 
 class Page:
@@ -49,7 +35,7 @@ class Page:
 
     Args:
       graph: the graph in its current state.
-      drawn: the result of `drawing`.
+      drawn: the graph and its states, drawn.
       observed: the observations of the run.
       report: the run's report.
       statistics: times and depths.
@@ -64,7 +50,7 @@ class Page:
     def __init__(
         self,
         graph: Graph,
-        drawn: tuple[str, str],
+        drawn: Drawn,
         observed: Observed,
         report: Report,
         statistics: Statistics,
@@ -91,6 +77,7 @@ class Page:
             *self._clock(),
             *self.own,
             *self._drawing(),
+            *self._states(),
             *self._timeline(),
             *monitors_section(self.judged, self.begun_at, self.report.duration_s),
             *self._errors(),
@@ -155,8 +142,7 @@ class Page:
         yield '<output id="now"></output> <span id="who"></span></div>\n'
 
     def _drawing(self) -> Iterator[str]:
-        if self.drawn[1]:
-            self.notes.append(self.drawn[1])
+        self.notes += self.drawn.left_out
         if self.observed.edits:
             count = self.observed.edits
             times = "once" if count == 1 else f"{count:,} times"
@@ -165,11 +151,19 @@ class Page:
         yield '<span class="right"><button type="button" id="fit">fit</button> '
         yield '<button type="button" id="smaller">-</button> <button type="button" id="larger">+</button>'
         yield '</span></div>\n<div class="picture" id="graph">'
-        yield self.drawn[0]
+        yield self.drawn.graph
         yield "</div>\n"
         if self.refused:
             yield "<p>Tinted nodes cannot be fused with others; the table of nodes says why.</p>\n"
         yield "</section>\n"
+
+    def _states(self) -> Iterator[str]:
+        if self.drawn.states:
+            yield '<section id="states" class="own"><h2>The states</h2>\n<div class="picture">'
+            yield self.drawn.states
+            yield "</div>\n"
+            yield from (f'<p class="caption">{escaped(said)}</p>\n' for said in self.drawn.said)
+            yield "</section>\n"
 
     def _timeline(self) -> Iterator[str]:
         joined = sum(times.joined for times in self.observed.times.values())

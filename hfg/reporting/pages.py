@@ -15,7 +15,8 @@ from hfg.base.whole import need_writable, write_whole
 from hfg.engine import Run, VirtualTimeLoop
 from hfg.errors import UsageError
 from hfg.monitors.watching import monitors_of
-from hfg.reporting.html import Page, drawing
+from hfg.reporting.drawn import Drawn
+from hfg.reporting.html import Page
 from hfg.reporting.observing import Observed
 from hfg.reporting.sections import Sections
 from hfg.trace import RunEnded, TraceEvent
@@ -41,7 +42,7 @@ class ReportPage(Sections):
         self._observed = observed
         self._when = time.time() if say_when else None
         # Drawn now: when a run is interrupted, there is no time for it at the end.
-        self._drawing = drawing(run.graph)
+        self._drawn = Drawn(run.graph)
         self._edits = 0
         self._outcome: str | None = None
 
@@ -68,11 +69,11 @@ class ReportPage(Sections):
         """Return the page with the run so far."""
         run, observed = self._run, self._observed
         if observed.edits != self._edits:
-            self._edits, self._drawing = observed.edits, drawing(run.graph)
+            self._edits, self._drawn = observed.edits, Drawn(run.graph)
         refused = {path: one.reason for path, one in run.explain().items() if one.refused}
         return Page(
             run.graph,
-            self._drawing,
+            self._drawn,
             observed,
             run.report(),
             run.statistics(),

@@ -1,4 +1,8 @@
-"""What a page asks for once: targets of an edge, node types, a value, measures, files. Depends on what answers each."""
+"""What a page asks for once: targets of an edge, node types, a value, measures, files. Depends on what answers each.
+
+A page sends `{"t": "ask", "id": 7, "what": "states", "args": {}}` and gets `{"t": "answer", "id": 7, "value": ...}`,
+or a `reject`. The value of each question is described where it is made; that of `states` in `hfg.studio.states`.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +31,7 @@ from hfg.studio.running_elsewhere import runs_of_this_user
 from hfg.studio.sampled_topics import node_measures
 from hfg.studio.showing import shown_value
 from hfg.studio.starters import starters
+from hfg.studio.states import states_of
 from hfg.studio.targets import targets
 
 __all__ = ["ask"]
@@ -129,6 +134,10 @@ async def _value_file(host: Following, args: _ValueFile) -> Any:
 
 async def _svg(host: Following, args: _Level) -> Any:
     return await asyncio.to_thread(level_as_svg, host.graph, args.level, args.view)
+
+
+async def _states(host: Following, args: _Nothing) -> Any:
+    return await states_of(host.graph, lambda: host.tables.rev)
 
 
 async def _next_token(host: Following, path: str) -> Token[Any]:
@@ -244,6 +253,7 @@ _ANSWERS: Final[Mapping[str, tuple[type[msgspec.Struct], Callable[[Following, An
     "value": (_Path, _value),
     "value_file": (_ValueFile, _value_file),
     "svg": (_Level, _svg),
+    "states": (_Nothing, _states),
     "node": (_Path, _node),
     "read_text": (_Said, _read_text),
     "folder": (_Path, _folder),

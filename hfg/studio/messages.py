@@ -199,7 +199,7 @@ class Level(_Message, frozen=True, tag="level"):
 
 
 class Ask(Request, frozen=True, tag="ask"):
-    """Ask for something once."""
+    """Ask for something once; `asking` says what can be asked, and what the answer is."""
 
     what: Text
     args: dict[str, Any] = {}

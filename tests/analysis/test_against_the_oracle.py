@@ -6,7 +6,8 @@ from collections import Counter
 
 import pytest
 
-from hfg.analysis.game import Game, Play
+from hfg.analysis.game import Game
+from hfg.analysis.playing import Play
 from hfg.analysis.searching import pairs_together, search
 from hfg.graph.flat import flatten
 from tests.analysis.exhaustive import Drawn, Explored, draw
@@ -21,8 +22,8 @@ def compare(drawn: Drawn) -> str:
     play = Play(game, game.nodes)
     found = search(play, MOST_STATES)
     states = explored.states()
-    places = dict(zip([edge.label for edge in game.edges], game.bits.one, strict=True))
-    places |= {game.flat.path(index): 1 << bit for index, bit in game.bits.node.items()}
+    places = dict(zip([edge.label for edge in game.edges], game.places.one, strict=True))
+    places |= {game.flat.path(index): 1 << bit for index, bit in game.places.node.items()}
     pairs = pairs_together(play)
     for active, lying in states:
         marked = [places[path] for path in active if path in places] + [places[label] for label, _ in lying]
@@ -31,9 +32,9 @@ def compare(drawn: Drawn) -> str:
             assert all(pairs[one] & other for other in marked if other != one), (drawn.graph.name, active, lying)
     if not found.is_complete:
         return "large"
-    reached = {(frozenset(game.active_in(state)), frozenset(_lying(game, state))) for state in found.reached}
+    reached = {(frozenset(game.places.active_in(state)), frozenset(_lying(game, state))) for state in found.reached}
     assert states <= reached, (drawn.graph.name, sorted(map(str, states - reached))[:3])
-    several = any(state & two for state in found.reached for two in game.bits.two)
+    several = any(state & two for state in found.reached for two in game.places.two)
     if not explored.is_complete or several or not drawn.is_plain:
         return "contained"
     assert {active for active, _ in states} == {active for active, _ in reached}, drawn.graph.name
@@ -43,7 +44,7 @@ def compare(drawn: Drawn) -> str:
 
 
 def _lying(game: Game, state: int) -> list[tuple[str, int]]:
-    bits = game.bits
+    bits = game.places
     return [
         (edge.label, 2 if state & bits.two[number] else 1)
         for number, edge in enumerate(game.edges)

@@ -164,9 +164,11 @@ def test_a_graph_without_active_edges_has_no_states_to_draw() -> None:
 
 
 def test_the_diagram_is_data() -> None:
-    graph = graph_of(one=State)
+    graph = hfg.Graph("states")
+    graph.add(State(), name="one", active_for_s=2.0)
     graph.connect("start", "one.take", active=True)
     assert hfg.analyse_activity(graph).as_data()["states"] == {
         "states": [{"path": "one", "passes_on": False}],
         "arrows": [{"source": "", "event": "start", "target": "one"}],
+        "limits": {"one": 2.0},
     }

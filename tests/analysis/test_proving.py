@@ -11,12 +11,14 @@ import pytest
 import hfg
 from examples.fetch_delivery.mission import build
 from hfg import commands
-from hfg.analysis.game import Game, Play
+from hfg.analysis.game import Game
+from hfg.analysis.playing import Play
 from hfg.analysis.proving import regions_of, verdict
 from hfg.analysis.searching import pairs_together, search
 from hfg.errors import GraphError, UsageError
 from hfg.graph.flat import flatten
 from hfg.nodes import activity
+from hfg.testing import replay_activity
 
 
 class Step(hfg.Node):
@@ -404,6 +406,73 @@ def test_where_setup_may_send_a_call_may_come_first() -> None:
     graph.add(Early(), name="early")
     found = hfg.analyse_activity(graph).at_most_one("one", "two")
     assert len(found.steps) == 1
+
+
+# --- modifiers that the code of a node hides from a quick look
+
+
+def pass_on(event: Any) -> None:
+    """Send +1 on behalf of a node."""
+    event.trigger(activity=1)
+
+
+class ByHelper(Says):
+    @hfg.slot
+    def send(self) -> None:
+        pass_on(self.a)
+
+
+class ByKeywords(Says):
+    @hfg.slot
+    def send(self) -> None:
+        options: Any = {"activity": 1}
+        self.a.trigger(**options)
+
+
+class ByNameOfPort(Says):
+    @hfg.slot
+    def send(self) -> None:
+        getattr(self, "a").trigger(activity=1)  # noqa: B009
+
+
+class ByLambda(Says):
+    @hfg.slot
+    def send(self) -> None:
+        (lambda: self.a.trigger(activity=1))()
+
+
+@pytest.mark.rule("A4")
+@pytest.mark.parametrize("kind", [Says, ByHelper, ByKeywords, ByNameOfPort, ByLambda])
+def test_modifiers_are_found_wherever_the_code_sends_them(kind: type[Says]) -> None:
+    """A node that is not active makes activity, so there are two."""
+    graph = ring()
+    graph.add(kind(), name="makes").a.activates(graph["one.begin"])
+    assert hfg.analyse_activity(graph).at_most_one("one", "other").holds is False
+
+
+@hfg.node
+def active_token(value: int) -> int:
+    return hfg.Token(value, 1)  # type: ignore[return-value]
+
+
+class ActiveToken(hfg.Node):
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> int:
+        return hfg.Token(value, 1)  # type: ignore[return-value]
+
+
+@pytest.mark.rule("A4")
+@pytest.mark.parametrize("kind", [active_token, ActiveToken])
+def test_a_token_that_is_returned_has_a_modifier_of_its_own(kind: Any) -> None:
+    graph = ring()
+    makes = graph.add(kind(), name="makes")
+    graph.connect(graph.input("data", int), makes.value)
+    graph.connect(makes.out, graph["one.begin"], active=True)
+    found = hfg.analyse_activity(graph).at_most_one("one", "other")
+    assert found.holds is False
+    assert replay_activity(graph, found).most == 2
 
 
 # --- after an edit

@@ -44,6 +44,7 @@ def test_the_ways_in_which_edges_may_fail_are_bounded(monkeypatch: pytest.Monkey
     monkeypatch.setattr(game, "_MOST_GIVEN", 1000)
     graph = hfg.Graph("fan")
     first = graph.add(Wait(), name="first")
+    graph.start.activates(first.begin)
     for number in range(100):
         first.done.activates(graph.add(Wait(), name=f"wait_{number}", on_error="disable").begin)
     with pytest.raises(GraphError, match='"first" sends activity in too many ways'):

@@ -263,7 +263,7 @@ def test_every_check_has_a_name_and_is_explained() -> None:
     sources = [
         *(ROOT / "hfg" / "graph").rglob("*.py"),
         *(ROOT / "hfg" / "files").rglob("*.py"),
-        ROOT / "hfg" / "activity" / "analysis.py",
+        ROOT / "hfg" / "analysis" / "checks.py",
         ROOT / "hfg" / "activity" / "description.py",
         ROOT / "hfg/cli/check.py",
     ]

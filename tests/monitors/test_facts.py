@@ -149,6 +149,22 @@ def test_a_run_without_debug_does_not_look(play: Play) -> None:
     play(build("at_most_one"), "one:ab", debug=False)
 
 
+@pytest.mark.rule("R4")
+def test_a_fact_that_an_edit_states_first_while_the_graph_runs_is_checked_from_then_on(
+    virtual_time: Callable[[Any], None],
+) -> None:
+    async def main() -> None:
+        graph = build()
+        async with hfg.running(graph, debug=True) as run:
+            await run.wait_quiet()
+            await run.edit(commands.Fact("at most one", ("one", "two", "three")))
+            await run.trigger(graph["one.send"], "ab")
+            await run.wait_finished()
+
+    with pytest.raises(MonitorViolated, match="the graph states that at most one of"):
+        virtual_time(main())
+
+
 @pytest.mark.rule("G2")
 def test_a_subgraph_stands_for_all_nodes_inside(play: Play) -> None:
     graph = build()

@@ -332,18 +332,19 @@ def test_a_graph_without_activity_has_a_page_too(tmp_path: Path) -> None:
 def test_a_large_graph_is_drawn_folded_and_one_that_is_too_large_not_at_all(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hfg.reporting.html._MOST_DRAWN", 3)
+    monkeypatch.setattr("hfg.reporting.drawn._MOST_DRAWN", 3)
     graph = mission()
     graph.add(Part(), name="other", enabled=False)
     assert "<li>the drawing, because the graph has 4 nodes; graph.draw makes it</li>" in page_of(
         graph, tmp_path / "a.html"
     )
-    monkeypatch.setattr("hfg.reporting.html._MOST_DRAWN", 4)
+    monkeypatch.setattr("hfg.reporting.drawn._MOST_DRAWN", 4)
     graph["other"].graph.add(State(), name="more")
     page = page_of(graph, tmp_path / "b.html")
     assert "<li>the insides of subgraphs, because there are 5 nodes in all</li>" in page
-    assert 'data-path="part"' in page
-    assert 'data-path="part/inner"' not in page
+    drawing = page.partition('<section id="drawing"')[2].partition("</section>")[0]
+    assert 'data-path="part"' in drawing
+    assert 'data-path="part/inner"' not in drawing
 
 
 def test_a_graph_that_was_edited_is_drawn_as_it_is_in_the_end(tmp_path: Path) -> None:
@@ -359,3 +360,21 @@ def test_a_graph_that_was_edited_is_drawn_as_it_is_in_the_end(tmp_path: Path) ->
     page = (tmp_path / "run.html").read_text(encoding="utf-8")
     assert 'data-path="goal"' in page
     assert "<li>the graph was changed once; the drawing shows its final state</li>" in page
+
+
+@pytest.mark.rule("A5", "A13")
+def test_the_page_shows_the_states_and_what_is_proved_of_them(tmp_path: Path) -> None:
+    pages: list[Any] = []
+    graph = mission()
+    hfg.run(graph, clock="virtual", begin=lambda run: pages.append(run.report_page(tmp_path / "run.html")))
+    states = (tmp_path / "run.html").read_text().partition('<section id="states"')[2].partition("</section>")[0]
+    assert 'data-path="part/inner"' in states
+    assert "timeout" in states
+    assert "exactly one of &quot;first&quot;, &quot;part/inner&quot;, &quot;last&quot; is active: proved" in states
+
+
+def test_a_page_of_a_graph_in_which_no_activity_moves_has_no_states(tmp_path: Path) -> None:
+    graph = hfg.Graph("still")
+    graph.connect(graph.add(script()).out, graph.add(sink()).value)
+    hfg.run(graph, clock="virtual", begin=lambda run: run.report_page(tmp_path / "run.html"))
+    assert 'id="states"' not in (tmp_path / "run.html").read_text()

@@ -93,7 +93,7 @@ def test_a_drawing_of_a_subgraphs_inside_bears_the_paths_by_which_the_page_shows
     hfg.run(graph, clock="virtual", begin=lambda run: pages.append(run.report_page(tmp_path / "run.html")))
     part: Any = graph["part"]
     pages[0].add_drawing("Inside", part.graph, caption="closer")
-    assert pages[0].text().count('data-path="part/inner"') == 2
+    assert pages[0].text().count('data-path="part/inner"') == 3, "in the graph, in its states, and in the section"
 
 
 @pytest.mark.parametrize("name", HOSTILE, ids=range(len(HOSTILE)))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import hfg
+from examples.fetch_delivery.mission import build as delivery
 from hfg.errors import HfgError
 from hfg.studio.capturing import value_as_file
 from tests.studio.page import Page, live, studio_of
@@ -205,3 +206,31 @@ def test_values_that_a_file_cannot_hold_are_refused_with_what_can_be_done() -> N
         value_as_file({"x": 1}, "a.out", "npy")
     with pytest.raises(HfgError, match=r"this array has 3 \(2 x 2 x 2\); save it as NPY"):
         value_as_file(np.zeros((2, 2, 2)), "a.out", "csv")
+
+
+@pytest.mark.rule("A5", "A13")
+def test_a_page_gets_the_states_laid_out_with_the_paths_of_the_graph_and_what_is_proved() -> None:
+    async def main() -> None:
+        graph = delivery()
+        page = Page(studio_of(graph)).join()
+        found = await page.value("states")
+        boxes = {one["id"] for one in found["layout"]["nodes"]}
+        states = {one["path"] for one in found["states"]["states"]}
+        assert states <= boxes
+        assert states <= set(page.tables["nodes"])
+        assert {"source": "robot_0/read_cube", "event": "received", "target": "robot_0/lookup"} in found["states"][
+            "arrows"
+        ]
+        assert [region["exactly_one"]["holds"] for region in found["regions"]] == [True]
+        assert found["problems"] == []
+
+    live(main)
+
+
+def test_a_graph_in_which_no_activity_moves_has_no_states_to_lay_out() -> None:
+    async def main() -> None:
+        found = await Page(studio_of(hfg.Graph("empty"))).join().value("states")
+        assert found["states"]["states"] == []
+        assert found["layout"] is None
+
+    live(main)

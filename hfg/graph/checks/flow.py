@@ -288,7 +288,7 @@ def silent_events(flat: FlatGraph) -> Iterator[Problem]:
     for edge in flat.edges:
         reason = None
         if edge.source.kind == "event" and edge.source.node != ROOT:
-            reason = _never_triggered(flat, edge)
+            reason = never_triggered(flat, edge)
         if reason is not None:
             what, remedy = reason
             yield Problem(
@@ -301,7 +301,8 @@ def silent_events(flat: FlatGraph) -> Iterator[Problem]:
             )
 
 
-def _never_triggered(flat: FlatGraph, edge: FlatEdge) -> tuple[str, str] | None:
+def never_triggered(flat: FlatGraph, edge: FlatEdge) -> tuple[str, str] | None:
+    """Return why nothing ever triggers the automatic event of an edge, and what helps; None if something may."""
     if edge.source.node < ROOT:
         scope = flat.scopes[scope_end(edge.source.node)]
         if edge.source.name == "timeout" and scope.options.active_for_s is None:

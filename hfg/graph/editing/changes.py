@@ -215,7 +215,7 @@ class GateChange(Change):
 class FactChange(Change):
     """A fact is stated or taken back."""
 
-    facts: list[Fact]
+    whole: Whole
     fact: Fact
     position: int
     added: bool
@@ -223,9 +223,10 @@ class FactChange(Change):
     @override
     def do(self) -> None:
         if self.added:
-            self.facts.insert(self.position, self.fact)
+            self.whole.facts.insert(self.position, self.fact)
         else:
-            del self.facts[self.position]
+            del self.whole.facts[self.position]
+        self.whole.laws_changed()
 
 
 @dataclass(eq=False)

@@ -232,9 +232,8 @@ class Steps:
     def state(self, fact: Fact) -> None:
         """State a fact, unless it is stated."""
         refuse_fact(self.root, fact)
-        facts = self.root.whole.facts
         if not any(one.says(fact) for one in facts_of(self.root)):
-            self.do(FactChange(facts, fact, len(facts), added=True))
+            self.do(FactChange(self.root.whole, fact, len(self.root.whole.facts), added=True))
 
     def retract(self, fact: Fact) -> None:
         """Take a fact back.
@@ -246,7 +245,7 @@ class Steps:
         known = next((number for number, one in enumerate(facts) if one.says(fact)), None)
         if known is None:
             raise GraphError(f"it is not stated that {fact}; graph.facts lists the facts that are")
-        self.do(FactChange(facts, facts[known], known, added=False))
+        self.do(FactChange(self.root.whole, facts[known], known, added=False))
 
     def ungate(self, level: Level, gate: Gate) -> None:
         """Remove a gate."""

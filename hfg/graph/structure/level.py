@@ -186,9 +186,10 @@ class Whole:
       run: the run it has, if any; a graph has one at a time.
       takes_commands: commands are being carried out, which a run follows and the history knows.
       facts: what users state about activity; those of removed nodes stay, because an undo brings the nodes back.
+        Debug runs are judged by them.
       notes: of editors, by node; None: those about the whole. Nothing else reads them, and they go with their node.
       monitors: what must hold of each run, by name; replaced as a whole.
-      on_monitors: called when they have changed; set by the code that judges the run.
+      on_laws: called when monitors or facts have changed; set by the code that judges the run.
       history: of edits; only the code that edits interprets its objects.
     """
 
@@ -201,7 +202,7 @@ class Whole:
         "make_face",
         "monitors",
         "notes",
-        "on_monitors",
+        "on_laws",
         "root",
         "run",
         "takes_commands",
@@ -219,29 +220,31 @@ class Whole:
         self.takes_commands = False
         self.notes: dict[Node | None, dict[str, Any]] = {}
         self.monitors: Mapping[str, MonitorSpec] = {}
-        self.on_monitors: Callable[[], None] | None = None
+        self.on_laws: Callable[[], None] | None = None
         self.history: History[Any] = History(lambda: self.root.title)
 
     def begin_run(self, run: object) -> None:
-        """From now on only commands change the structure. Monitors judge; a debug run also checks facts."""
+        """From now on only commands change the structure. Monitors judge, and in a debug run facts, too."""
         self.run = run
         try:
-            hooks.monitor(run, self)
-            if self.facts:
-                hooks.watch_facts(run)
+            hooks.judge(run, self)
         except BaseException:
             self.end_run()
             raise
 
     def end_run(self) -> None:
         """It may be changed by hand again."""
-        self.run = self.on_monitors = None
+        self.run = self.on_laws = None
 
     def set_monitors(self, monitors: Mapping[str, MonitorSpec]) -> None:
         """Let other monitors judge."""
         self.monitors = monitors
-        if self.on_monitors is not None:
-            self.on_monitors()
+        self.laws_changed()
+
+    def laws_changed(self) -> None:
+        """Let the run be judged by the monitors and facts that there are now."""
+        if self.on_laws is not None:
+            self.on_laws()
 
     @contextmanager
     def taking_commands(self) -> Iterator[None]:

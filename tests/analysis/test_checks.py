@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 import hfg
-from hfg.activity.analysis import ActivityAnalysis
-from hfg.activity.explicit import may_give_activity
+from hfg.analysis.checks import Found
+from hfg.analysis.words import sets_modifiers
 from hfg.engine.runtime import engine
 from hfg.errors import Problem, RunError
 from hfg.graph.flat import flatten, scope_end
@@ -89,7 +89,7 @@ def test_activity_that_begins_at_start_reaches_whom_active_edges_lead_to(graph: 
     graph.connect(first.done, second.enter, active=True)
     graph.connect(second.out, third.value, active=True)
     assert of_activity(graph) == []
-    assert ActivityAnalysis(flatten(graph)).active == [True, True, True]
+    assert Found(flatten(graph)).spread.active == [True, True, True]
 
 
 @pytest.mark.rule("A3", "A7")
@@ -152,18 +152,18 @@ def test_what_gives_activity_otherwise_is_known(graph: hfg.Graph, way: str) -> N
 
 @pytest.mark.rule("A4")
 @pytest.mark.parametrize("kind", [Greeter, ByHelper, ByKeywords, made])
-def test_code_that_may_give_activity_by_itself_is_left_alone(graph: hfg.Graph, kind: Any) -> None:
+def test_code_that_sets_modifiers_by_itself_is_left_alone(graph: hfg.Graph, kind: Any) -> None:
     node, after = graph.add(kind()), graph.add(Step(), active_for_s=1.0)
     graph.connect(node.ports.outputs["out"], after.value, active=True)
     graph.connect(graph.add(script()).out, node.ports.inputs["value"])
-    assert may_give_activity(type(node)._type)
+    assert sets_modifiers(type(node)._type)
     assert of_activity(graph) == []
 
 
 @pytest.mark.rule("A4")
 def test_code_that_does_not_speak_of_activity_gives_none() -> None:
-    assert not any(may_give_activity(type(node)._type) for node in (Step(), double(), script(), sink()))
-    assert not may_give_activity(type(hfg.node(abs, inputs={"x": int}, outputs=int)())._type)
+    assert not any(sets_modifiers(type(node)._type) for node in (Step(), double(), script(), sink()))
+    assert not sets_modifiers(type(hfg.node(abs, inputs={"x": int}, outputs=int)())._type)
 
 
 @pytest.mark.rule("G2")
@@ -185,7 +185,7 @@ def test_a_subgraph_is_active_when_something_inside_may_be(graph: hfg.Graph) -> 
     graph.start.activates(begin.activate)
     graph.gate(work, by=reached)
     assert one(graph, "never-active").path == "box"
-    found = ActivityAnalysis(flatten(graph))
+    found = Found(flatten(graph)).spread
     assert (found.may_be_active(scope_end(0)), found.may_be_active(scope_end(1))) == (True, False)
     graph.connect(begin.done, lost.begin, active=True)
     assert of_activity(graph) == []
@@ -237,7 +237,7 @@ def test_whoever_becomes_active_in_a_run_was_expected_to(block: int, monkeypatch
     for seed in range(50 * block, 50 * block + 50):
         graph = random_plan(seed, Allowed(failures=False, waiting=False)).build()
         flat = flatten(graph)
-        analysis = ActivityAnalysis(flat)
+        analysis = Found(flat).spread
         trace = recorder()
         with contextlib.suppress(RunError):
             hfg.run(graph, clock="virtual", policy="random", seed=seed, trace=trace, until_s=5)

@@ -1,104 +1,51 @@
-"""The nodes that can ever become active, found without running: a fixed point over active edges (rules A3-A12, G2).
+"""What the first stage of the token game shows of activity, as problems: they add to the checks of graphs.
 
-Activity comes from `start`, from edges into a slot `activate`, from feeds, from code that may send its own modifiers
-(A4), and from active nodes over their active edges. Anything uncertain counts as possible. A program outside the
-graph can activate any node, by `run.trigger(slot, activity=+1)`; so each result is only a warning, or a hint if all
-activity may come from outside. Depends on the flat graph and `explicit`.
+No code is read, and every graph is checked before it runs. A program outside the graph can activate any node, by
+`run.trigger(slot, activity=+1)`; so each result is only a warning, or a hint if all activity may come from outside.
+Depends on `spread`.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
 
-from hfg.activity.explicit import may_give_activity
+from hfg.analysis.moves import Moves, unread
+from hfg.analysis.spread import Spread
 from hfg.errors import Problem
 from hfg.graph.checks import also
-from hfg.graph.checks.flow import never_fires
 from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.graph.flat.order import strongly_connected
 
-__all__ = ["ActivityAnalysis", "activity_problems"]
+__all__ = ["Found", "activity_problems"]
 
 
-class ActivityAnalysis:
-    """The possible effects of activity in one flat graph.
+class Found:
+    """Where activity may come in a graph, and what depends on it.
 
     Nodes and subgraphs are named as in `End.node`.
 
     Attributes:
-      active: per node, whether it may ever become active.
+      flat: the graph.
+      edges: the active edges.
+      moves: what each node may do.
+      spread: where activity may come.
       asks: per node or subgraph, the things in the graph that depend on its activity, in words.
     """
 
     def __init__(self, flat: FlatGraph) -> None:
         self.flat = flat
-        self._still = never_fires(flat)
-        self._from: dict[int, list[FlatEdge]] = {}  # active edges by their source
-        for edge in flat.edges:
-            if edge.active:
-                self._from.setdefault(edge.source.node, []).append(edge)
-        # Only what leaves over an active edge carries activity. An iteration is many rounds of its inside: who knows.
-        self._gives = [
-            node.iteration is not None or (node.index in self._from and may_give_activity(node.node._type))
-            for node in flat.nodes
-        ]
-        self.active = [False] * len(flat.nodes)
-        self._spread()
+        self.edges = [edge for edge in flat.edges if edge.active]
+        self.moves = Moves(flat, unread)
+        outside = (number for number, edge in enumerate(self.edges) if edge.source.node == ROOT)
+        self.spread = Spread(flat, self.moves, self.edges, outside)
         self.asks = self._find_asking()
-
-    def may_be_active(self, end: int) -> bool:
-        """Return whether a node or subgraph may become active. A subgraph is active while a node inside is (G2)."""
-        return any(self.active[member] for member in self.flat.members(end))
-
-    def may_carry(self, edge: FlatEdge) -> bool:
-        """Return whether a token with +1 may ever leave over an active edge (A3, A4)."""
-        source = edge.source
-        if source.node == ROOT:
-            return True  # `start`, or a feed: the program outside decides
-        if source.kind == "event" and source.name == "deactivated":
-            own = source.port.node._type.events
-            return source.name in own  # whoever has just become inactive has nothing to give (A9)
-        if source.node < ROOT:
-            return self.may_be_active(source.node)
-        if source.kind != "event" and source.node in self._still:
-            return False
-        return self._gives[source.node] or self.active[source.node]
-
-    def _spread(self) -> None:
-        """Spread activity wherever it may go, until nothing changes."""
-        waiting: deque[int] = deque()
-
-        def activate(index: int) -> None:
-            if not self.active[index]:
-                self.active[index] = True
-                waiting.append(index)
-
-        def arrive(edge: FlatEdge) -> None:
-            target = edge.target
-            if target.node <= ROOT or (target.kind == "slot" and target.name == "deactivate"):
-                return
-            if target.kind == "slot" or target.node not in self._still:
-                activate(target.node)
-
-        for node in self.flat.nodes:
-            if self._gives[node.index]:
-                activate(node.index)  # what it gave comes back to it where it is discarded (A8)
-        for edge in self.flat.edges:
-            if edge.target.kind == "slot" and edge.target.name == "activate" and edge.target.node > ROOT:
-                activate(edge.target.node)
-        for edge in self._from.get(ROOT, ()):
-            arrive(edge)
-        while waiting:
-            index = waiting.popleft()
-            for end in (index, *(scope_end(scope) for scope in self.flat.nodes[index].scopes)):
-                for edge in self._from.get(end, ()):
-                    if self.may_carry(edge):
-                        arrive(edge)
 
     def _find_asking(self) -> dict[int, list[str]]:
         asks: dict[int, list[str]] = {}
-        for end, edges in self._from.items():
+        begins: dict[int, list[FlatEdge]] = {}
+        for edge in self.edges:
+            begins.setdefault(edge.source.node, []).append(edge)
+        for end, edges in begins.items():
             if end != ROOT:
                 more = f" and {len(edges) - 1} more are" if len(edges) > 1 else " is"
                 asks.setdefault(end, []).append(f'"{edges[0].label}"{more} active')
@@ -120,7 +67,7 @@ def activity_problems(flat: FlatGraph) -> Iterator[Problem]:
     asked = flat.gates or _has_time_limits(flat) or any(map(_does, flat.nodes))
     if not asked and not any(edge.active for edge in flat.edges):
         return
-    found = ActivityAnalysis(flat)
+    found = Found(flat)
     yield from _never_active(found)
     yield from _idle_edges(found)
     yield from _losing_edges(found)
@@ -138,9 +85,9 @@ def _has_time_limits(flat: FlatGraph) -> bool:
     return any(options.active_for_s is not None for _, options in flat.options())
 
 
-def _never_active(found: ActivityAnalysis) -> Iterator[Problem]:
-    lost = [end for end in found.asks if not found.may_be_active(end)]
-    begins = any(found.active)
+def _never_active(found: Found) -> Iterator[Problem]:
+    lost = [end for end in found.asks if not found.spread.may_be_active(end)]
+    begins = any(found.spread.active)
     for first, *others in _clusters(found, lost):
         more = f", nor {_named(found, others)} behind it" if others else ""
         yield Problem(
@@ -154,7 +101,7 @@ def _never_active(found: ActivityAnalysis) -> Iterator[Problem]:
         )
 
 
-def _clusters(found: ActivityAnalysis, lost: list[int]) -> Iterator[list[int]]:
+def _clusters(found: Found, lost: list[int]) -> Iterator[list[int]]:
     """Those that active edges connect are one finding; each begins with one that none of the others leads to."""
     neighbours: dict[int, list[int]] = {}
     led_to: set[int] = set()
@@ -163,12 +110,11 @@ def _clusters(found: ActivityAnalysis, lost: list[int]) -> Iterator[list[int]]:
         neighbours.setdefault(source, []).append(target)
         neighbours.setdefault(target, []).append(source)
 
-    for edges in found._from.values():
-        for edge in edges:
-            source, target = edge.source.node, edge.target.node
-            if ROOT not in (source, target) and source != target and not found.may_be_active(source):
-                connect(source, target)
-                led_to.add(target)
+    for edge in found.edges:
+        source, target = edge.source.node, edge.target.node
+        if ROOT not in (source, target) and source != target and not found.spread.may_be_active(source):
+            connect(source, target)
+            led_to.add(target)
     for end in lost:
         for member in found.flat.members(end):
             connect(end, member)
@@ -181,18 +127,20 @@ def _clusters(found: ActivityAnalysis, lost: list[int]) -> Iterator[list[int]]:
         seen.add(end)
         for member in cluster:
             fresh = [other for other in neighbours.get(member, ()) if other not in seen]
-            fresh = [other for other in dict.fromkeys(fresh) if not found.may_be_active(other)]
+            fresh = [other for other in dict.fromkeys(fresh) if not found.spread.may_be_active(other)]
             seen.update(fresh)
             cluster += fresh
         yield [member for member in cluster if member in asking]
 
 
-def _idle_edges(found: ActivityAnalysis) -> Iterator[Problem]:
+def _idle_edges(found: Found) -> Iterator[Problem]:
     """Active edges over which nothing active ever comes, though their node may be."""
-    for edge in found.flat.edges:
+    for number, edge in enumerate(found.edges):
         source = edge.source
-        if not edge.active or found.may_carry(edge) or source.node == ROOT or not found.may_be_active(source.node):
+        if number in found.spread.reached or not found.spread.may_be_active(source.node):
             continue
+        if source.kind == "event" and source.name != "deactivated":
+            continue  # nothing at all ever comes over it, which another check says
         if source.kind == "event":
             why = "who has just lost its activity has none to give (rules A3, A9)"
             remedy = "draw it from the event by which the activity leaves, or leave out active=True"
@@ -209,10 +157,10 @@ def _idle_edges(found: ActivityAnalysis) -> Iterator[Problem]:
         )
 
 
-def _losing_edges(found: ActivityAnalysis) -> Iterator[Problem]:
+def _losing_edges(found: Found) -> Iterator[Problem]:
     """Active edges into slots of a subgraph itself, which can keep no activity (G2)."""
-    for edge in found.flat.edges:
-        if edge.active and edge.target.node < ROOT and found.may_carry(edge):
+    for number, edge in enumerate(found.edges):
+        if edge.target.node < ROOT and number in found.spread.reached:
             yield Problem(
                 path=edge.label,
                 severity="warning",
@@ -223,16 +171,14 @@ def _losing_edges(found: ActivityAnalysis) -> Iterator[Problem]:
             )
 
 
-def _forks(found: ActivityAnalysis) -> Iterator[Problem]:
+def _forks(found: Found) -> Iterator[Problem]:
     """One state becomes two where a machine was meant.
 
     A part of the graph is taken for a machine if all its nodes can hand the activity on to each other. Two ways at once
     are meant there if a node of the part takes activity by two inputs: it waits until both have come.
     """
     flat = found.flat
-    edges = [
-        edge for edge in flat.edges if edge.active and edge.target.node > ROOT and edge.target.name != "deactivate"
-    ]
+    edges = [edge for edge in found.edges if edge.target.node > ROOT and edge.target.name != "deactivate"]
     successors: list[list[int]] = [[] for _ in flat.nodes]
     joins: dict[int, int] = {}
     for edge in edges:
@@ -273,7 +219,7 @@ def _forks(found: ActivityAnalysis) -> Iterator[Problem]:
             )
 
 
-def _unheard_limits(found: ActivityAnalysis) -> Iterator[Problem]:
+def _unheard_limits(found: Found) -> Iterator[Problem]:
     """Time limits of activity at whose end nothing happens (A12)."""
     flat = found.flat
     heard = {edge.source.node for edge in flat.edges if edge.source.kind == "event" and edge.source.name == "timeout"}
@@ -293,40 +239,41 @@ def _unheard_limits(found: ActivityAnalysis) -> Iterator[Problem]:
         )
 
 
-def _captives(found: ActivityAnalysis) -> Iterator[Problem]:
-    """Nodes that keep their activity for good, though somebody waits until it leaves (A5, A9)."""
+def _captives(found: Found) -> Iterator[Problem]:
+    """Nodes that keep their activity permanently, although another node waits until it leaves (A5, A9)."""
     flat = found.flat
     freed = {edge.target.node for edge in flat.edges if edge.target.kind == "slot" and edge.target.name == "deactivate"}
-    for edges in found._from.values():
-        for edge in edges:
-            if edge.source.node > ROOT and may_give_activity(flat.nodes[edge.source.node].node._type):
-                freed.add(edge.target.node)  # which may take it away, by a modifier of its own (A4)
+    for number, edge in enumerate(found.edges):
+        source = edge.source.node
+        if source > ROOT and found.moves.of(flat.nodes[source]).says:
+            freed.add(edge.target.node)  # which may take it away, by a modifier of its own (A4)
+        if number in found.spread.reached:
+            freed.add(source)
     for node in flat.nodes:
         around = (node.index, *(scope_end(scope) for scope in node.scopes))
-        leaves = any(found.may_carry(edge) for end in around for edge in found._from.get(end, ()))
-        if not found.active[node.index] or leaves or not freed.isdisjoint(around) or node.iteration is not None:
+        if not found.spread.active[node.index] or not freed.isdisjoint(around) or node.iteration is not None:
             continue
         waiting = [edge for edge in flat.edges if edge.source.node == node.index and _waits_for_leaving(found, edge)]
         if waiting:
             yield Problem(
                 path=node.path,
                 severity="warning",
-                what=f'its activity can never leave it, but "{waiting[0].label}" waits for that',
+                what=f'its activity can never leave it, but "{waiting[0].label}" waits until it does',
                 why="no active edge leads out over which activity could go, and nothing deactivates it (rules A5, A7)",
                 remedy="make the edge active by which the activity is to leave, or connect its slot deactivate",
                 check="captive-activity",
             )
 
 
-def _waits_for_leaving(found: ActivityAnalysis, edge: FlatEdge) -> bool:
-    """Whether an edge tells that activity has left, or leads to somebody who asks for it and never gets any."""
+def _waits_for_leaving(found: Found, edge: FlatEdge) -> bool:
+    """Whether an edge reports that activity has left, or leads to a node that asks for it and never gets any."""
     if edge.source.kind == "event" and edge.source.name == "deactivated":
         return edge.source.name not in edge.source.port.node._type.events
     target = edge.target.node
-    return target != ROOT and not edge.active and target in found.asks and not found.may_be_active(target)
+    return target != ROOT and not edge.active and target in found.asks and not found.spread.may_be_active(target)
 
 
-def _named(found: ActivityAnalysis, ends: list[int]) -> str:
+def _named(found: Found, ends: list[int]) -> str:
     paths = [f'"{found.flat.path(end)}"' for end in ends]
     if len(paths) > 4:
         paths = [*paths[:3], f"{len(paths) - 3} more"]

@@ -1,7 +1,7 @@
-"""Whether the code of a node type may give activity by itself (rule A4): what can be known by reading it.
+"""Whether the code of a node type may send modifiers of its own (rule A4): what the words in it show.
 
-Code makes activity with `activity=...` in a send or trigger, by a token that it makes, or by its own slot `activate`.
-It may also hide that well, so the answer "no" means "not that its code shows". Depends on node types.
+A modifier is sent by `activity=...` in a send or trigger, or by a token that the code makes. Code may also hide that
+well, so "no" means "not that its code shows". Depends on node types.
 """
 
 from __future__ import annotations
@@ -13,15 +13,23 @@ from typing import Any, Final
 
 from hfg.nodetypes.node import Node, NodeType
 
-__all__ = ["may_give_activity"]
+__all__ = ["makes_tokens", "sets_modifiers", "words"]
 
-_TELLING: Final = frozenset({"activity", "Token", "activate"})
-_MOST_FUNCTIONS: Final = 200  # code that calls so much is not read to its end
+_MOST_FUNCTIONS: Final = 200  # code that calls more is not read to its end
 
 
-@functools.lru_cache(maxsize=4096)
-def may_give_activity(kind: NodeType) -> bool:
-    """Say whether something in the type's code, or in what it calls of its own package, speaks of activity."""
+def sets_modifiers(kind: NodeType) -> bool:
+    """Return whether the type's code, or what it calls of its own package, speaks of modifiers or of tokens."""
+    return _speaks_of(kind, frozenset({"activity", "Token"}))
+
+
+def makes_tokens(kind: NodeType) -> bool:
+    """Return whether the code speaks of tokens, which have modifiers."""
+    return _speaks_of(kind, frozenset({"Token"}))
+
+
+@functools.lru_cache(maxsize=8192)
+def _speaks_of(kind: NodeType, telling: frozenset[str]) -> bool:
     package = kind.module.partition(".")[0]
     waiting = list(_functions(kind))
     seen: set[int] = set()
@@ -32,10 +40,10 @@ def may_give_activity(kind: NodeType) -> bool:
         seen.add(id(function))
         if len(seen) > _MOST_FUNCTIONS:
             return True
-        names = set(_words(function.__code__))
-        if names & _TELLING:
+        spoken = set(words(function.__code__))
+        if spoken & telling:
             return True
-        waiting += [one for one in _called(function, names) if (one.__module__ or "").partition(".")[0] == package]
+        waiting += [one for one in _called(function, spoken) if (one.__module__ or "").partition(".")[0] == package]
     return False
 
 
@@ -58,27 +66,27 @@ def _behind(value: Any) -> Iterator[FunctionType]:
             yield held
 
 
-def _words(code: CodeType) -> Iterator[str]:
-    """Names and texts in a function and in those inside it."""
+def words(code: CodeType) -> Iterator[str]:
+    """Yield names and texts in a function and in those inside it."""
     yield from code.co_names
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
-            yield from _words(constant)
+            yield from words(constant)
         elif isinstance(constant, str):
             yield constant
         elif isinstance(constant, tuple):
             yield from (one for one in constant if isinstance(one, str))  # the keywords of a call
 
 
-def _called(function: FunctionType, names: set[str]) -> Iterator[FunctionType]:
+def _called(function: FunctionType, spoken: set[str]) -> Iterator[FunctionType]:
     """The functions that it refers to by name, in its module, in modules it names, or around it."""
     cells = [cell.cell_contents for cell in function.__closure__ or () if _is_filled(cell)]
-    found = [function.__globals__.get(name) for name in names]
+    found = [function.__globals__.get(name) for name in spoken]
     for value in (*found, *cells):
         if isinstance(value, FunctionType):
             yield value
         elif isinstance(value, ModuleType):
-            yield from (one for name in names if isinstance(one := vars(value).get(name), FunctionType))
+            yield from (one for name in spoken if isinstance(one := vars(value).get(name), FunctionType))
         elif isinstance(value, type) and not issubclass(value, Node):
             yield from (one for one in vars(value).values() if isinstance(one, FunctionType))
 
