@@ -75,6 +75,7 @@ function Away() {
       </span>
       <span>
         <b>No word from the studio for {seconds} s.</b> {run ? `You see how it was at ${moment(Math.max(0, elapsed(run, offset) - seconds))}. ` : ""}Edits wait until it answers.
+        {phase === "closed" && why !== "" && ` The studio says: ${why}.`}
         {run?.state === "running" && loop > BUSY && " The loop was busy: a node that computes for long holds up the studio, too. A thread of its own (in the inspector, group) helps."}
       </span>
       <button type="button" className="btn line" onClick={() => socket.connect()}>
