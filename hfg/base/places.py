@@ -105,13 +105,18 @@ class Place:
             return os.stat(self._at(name), dir_fd=self.folder, follow_symlinks=False)
         return None
 
-    def open(self, flags: int, name: str = "") -> int:
+    def open(self, flags: int, name: str = "", *, mode: int = 0o666) -> int:
         """Open it, or a file next to it, but no link in its place.
+
+        Args:
+          flags: as of `os.open`.
+          name: of the file next to it.
+          mode: the permissions of a file that is made.
 
         Raises:
           OSError: it cannot be opened.
         """
-        return os.open(self._at(name), flags | _FILE, 0o666, dir_fd=self.folder)
+        return os.open(self._at(name), flags | _FILE, mode, dir_fd=self.folder)
 
     def make_folder(self, prefix: str) -> str:
         """Make a folder next to it that only this user can enter; return its name, which cannot be taken first."""

@@ -17,6 +17,7 @@ import msgspec
 
 from hfg.base.bounds import JOURNAL_BYTES
 from hfg.base.places import Place, need_own
+from hfg.encoding.plain import need_few_values
 from hfg.errors import UsageError
 from hfg.tuning.evaluating import Outcome
 
@@ -62,7 +63,7 @@ class Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
       scores: what it gave.
       why: a sentence, if it went wrong.
       simulated_s: how long the run lasted on its own clock.
-      values: for readers; the search does not use them.
+      values: for readers, in JSON; the search does not use them.
     """
 
     candidate: int
@@ -72,7 +73,7 @@ class Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     scores: list[float]
     why: str
     simulated_s: float
-    values: dict[str, Any] = {}
+    values: msgspec.Raw = msgspec.Raw(b"{}")
 
 
 class Journal:
@@ -145,7 +146,10 @@ class Journal:
         except ImportError:
             pass
         except OSError:
-            raise UsageError(f'another process writes the journal "{self._path}" now; wait for it') from None
+            raise UsageError(
+                f'another process writes the journal "{self._path}" now, or a user who can read it has locked it; '
+                "wait for it, or name another file"
+            ) from None
 
     def _read(self, path: Path, header: Header) -> int:
         """Read the lines. Return how many bytes whole lines have."""
@@ -161,9 +165,11 @@ class Journal:
         if not lines:
             return 0
         try:
+            need_few_values(data)
             there = msgspec.json.decode(lines[0], type=Header)
             found = [msgspec.json.decode(line, type=Line) for line in lines[1:]]
-        except (msgspec.DecodeError, RecursionError) as error:
+            _need_scores(found, len(there.scores))
+        except (ValueError, RecursionError) as error:
             raise UsageError(f'"{path}" is not the journal of a search: {error}; name another file') from None
         for name in header.__struct_fields__:
             mine, its = getattr(header, name), getattr(there, name)
@@ -176,10 +182,21 @@ class Journal:
         return whole
 
 
+def _need_scores(lines: Sequence[Line], count: int) -> None:
+    """Check that each run that went well has all scores.
+
+    Raises:
+      ValueError: one has not.
+    """
+    for line in lines:
+        if line.outcome == "ok" and len(line.scores) != count:
+            raise ValueError(f"candidate {line.candidate} has {len(line.scores)} scores, not {count}")
+
+
 def _opened(path: Path) -> Any:
-    """Open a plain file for reading and writing; it is made if it is not there."""
+    """Open a plain file for reading and writing; one that is made can be read, and so locked, by this user only."""
     with Place(path) as place:
-        number = place.open(os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0))
+        number = place.open(os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0), mode=0o600)
         try:
             there = os.fstat(number)
             if not stat.S_ISREG(there.st_mode):

@@ -207,7 +207,8 @@ class Searching:
 
     def _line(self, candidate: Candidate, seed: Seed, told: Told) -> Line:
         said = (told.outcome, told.scores, told.why, told.simulated_s)
-        return Line(candidate.number, seed, list(candidate.at), *said, self._plain(candidate))
+        plain = msgspec.Raw(msgspec.json.encode(self._plain(candidate)))
+        return Line(candidate.number, seed, list(candidate.at), *said, plain)
 
     def _started(self) -> Workers:
         """Return the processes; they are started when the first of them is needed."""

@@ -226,7 +226,7 @@ def test_a_value_is_in_the_file_or_the_whole_change_is_not(file: str) -> None:
             {"lossless": False},
             "which does not wait for subscribers, and with an outbox, from which nothing must get lost",
         ),
-        ({"outbox": "/no/such/folder/box"}, "cannot be used: unable to open database file; use a writable path"),
+        ({"outbox": "/no/such/folder/box"}, "cannot be used: No such file or directory; use a writable path"),
     ],
 )
 def test_an_outbox_that_cannot_be_is_one_sentence(

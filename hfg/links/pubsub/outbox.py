@@ -10,9 +10,17 @@ import secrets
 import sqlite3
 import threading
 from collections.abc import Sequence, Set
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
+from hfg.base.bounds import FILE_BYTES
+from hfg.base.databases import open_database
 from hfg.errors import RunError
+
+_TABLES: Final = {
+    "hfg_outbox": "name TEXT PRIMARY KEY, type TEXT, stream TEXT, last INT",
+    "hfg_outbox_value": "number INTEGER PRIMARY KEY, metadata BLOB, value BLOB",
+    "hfg_outbox_member": "id TEXT PRIMARY KEY",
+}
 
 
 class KeptValue(NamedTuple):
@@ -52,25 +60,37 @@ class OutboxFile:
         self._name = name
         self._lock = threading.Lock()
         try:
-            self._file = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
-            self._file.execute("PRAGMA synchronous = FULL")
-            self._file.execute("PRAGMA locking_mode = EXCLUSIVE")
+            self._file = open_database(path, _TABLES)
+        except (sqlite3.Error, OSError, ValueError) as error:
+            raise self._refuse(error) from error
+        try:
             self._file.execute("PRAGMA journal_mode = WAL")  # one wait for the disk a change instead of three
-            self._file.execute("BEGIN EXCLUSIVE")
-            self._file.execute(
-                "CREATE TABLE IF NOT EXISTS hfg_outbox (name TEXT PRIMARY KEY, type TEXT, stream TEXT, last INT)"
-            )
-            self._file.execute(
-                "CREATE TABLE IF NOT EXISTS hfg_outbox_value (number INTEGER PRIMARY KEY, metadata BLOB, value BLOB)"
-            )
-            self._file.execute("CREATE TABLE IF NOT EXISTS hfg_outbox_member (id TEXT PRIMARY KEY)")
-            self._file.execute("COMMIT")
+            self._need_fair()
             self.stream, self.last = self._begin(fingerprint)
             rows = self._file.execute("SELECT number, metadata, value FROM hfg_outbox_value ORDER BY number")
             self.kept = [KeptValue(*row) for row in rows]
             self.members = {one for (one,) in self._file.execute("SELECT id FROM hfg_outbox_member")}
-        except sqlite3.Error as error:
-            raise self._refuse(error) from error
+        except BaseException as error:
+            self._file.close()
+            raise (self._refuse(error) if isinstance(error, sqlite3.Error | ValueError) else error) from error
+
+    def _need_fair(self) -> None:
+        """Check that what is kept fits into memory, and is what is kept in such a file.
+
+        Raises:
+          ValueError: it does not, or is not.
+        """
+        size, wrong = self._file.execute(
+            "SELECT total(length(metadata) + length(value)), "
+            "count(*) - total(typeof(metadata) = 'blob' AND typeof(value) = 'blob') FROM hfg_outbox_value"
+        ).fetchone()
+        wrong += self._file.execute(
+            "SELECT count(*) FROM hfg_outbox WHERE typeof(stream) <> 'text' OR typeof(last) <> 'integer'"
+        ).fetchone()[0]
+        if wrong:
+            raise ValueError("it holds what no publisher has kept")
+        if size > FILE_BYTES.most:
+            raise ValueError(f"its values have {size:,.0f} bytes, {FILE_BYTES.remedy}")
 
     def _begin(self, fingerprint: str) -> tuple[str, int]:
         """Return the stream to continue, and its last number; a new stream if no value of the old one is left."""
@@ -79,7 +99,6 @@ class OutboxFile:
         if found is not None and found[:2] == (self._name, fingerprint):
             return found[2], found[3]
         if found is not None and count:
-            self._file.close()
             what = f'of "{found[0]}"' if found[0] != self._name else "of another type"
             raise RunError(
                 f'outbox "{self.path}" has {count} values {what}, so "{self._name}" cannot be published with '
@@ -146,8 +165,9 @@ class OutboxFile:
                     self._file.execute("ROLLBACK")
                 raise self._refuse(error) from error
 
-    def _refuse(self, error: sqlite3.Error) -> RunError:
+    def _refuse(self, error: Exception) -> RunError:
+        why = getattr(error, "strerror", None) or error
         return RunError(
-            f'outbox "{self.path}" of "{self._name}" cannot be used: {error}; use a writable path of an '
+            f'outbox "{self.path}" of "{self._name}" cannot be used: {why}; use a writable path of an '
             "outbox, or of a file that does not exist, that no other publisher has open"
         )

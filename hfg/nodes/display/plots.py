@@ -5,14 +5,18 @@ Depends on nodetype, ports and numpy.
 
 from __future__ import annotations
 
+import os
+import sys
 from collections import deque
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from pathlib import Path
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from annotated_types import Interval, Predicate
 
 from hfg.base.token import Token
+from hfg.errors import UsageError
 from hfg.images import Color
 from hfg.nodes._extras import require
 from hfg.nodes.files.access import is_a_path, named, write_whole
@@ -22,6 +26,8 @@ from hfg.ports import Input, Inputs, Output, Parameter, State, slot
 
 Numbers: TypeAlias = float | Vector
 """One number, or several: a list of them or an array with one axis."""
+
+_SETTINGS: Final = "matplotlibrc"
 
 
 class _Plot(Node):
@@ -51,6 +57,7 @@ class _Plot(Node):
 
     def _picture(self) -> Color:
         self.since = 0
+        _need_no_strange_settings()
         require("matplotlib", "plot")
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -86,6 +93,27 @@ class _Plot(Node):
         """Draw what a run that was stopped has left."""
         if self.path and self.since:
             self._picture()
+
+
+def _need_no_strange_settings() -> None:
+    """Refuse settings of matplotlib that lie in the working directory, unless they are named: they can run programs.
+
+    Another person may have made the folder, and matplotlib reads the file when it is imported (rule L4).
+
+    Raises:
+      UsageError: there are some.
+    """
+    file, named = Path(_SETTINGS), os.environ.get("MATPLOTLIBRC", "")
+    if "matplotlib" in sys.modules or not file.exists() or (named and file.resolve() == _settings_in(Path(named))):
+        return
+    raise UsageError(
+        f"matplotlib would take its settings from {file.absolute()}, and settings can run programs: if you trust it, "
+        f"set MATPLOTLIBRC={_SETTINGS}, else remove it or work in another folder"
+    )
+
+
+def _settings_in(place: Path) -> Path:
+    return (place / _SETTINGS if place.is_dir() else place).resolve()
 
 
 def finite(values: Any) -> Any:

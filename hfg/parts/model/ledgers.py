@@ -7,9 +7,12 @@ from __future__ import annotations
 
 import sqlite3
 import zlib
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
+from hfg.base.databases import open_database
 from hfg.errors import RunError
+
+_TABLES: Final = {"hfg_ledger": "part TEXT PRIMARY KEY, life INT, sum INT, data BLOB"}
 
 
 class Entry(NamedTuple):
@@ -72,20 +75,18 @@ class LedgerFile(Ledger):
         self.path = path
         self._part = part
         try:
-            self._file = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
-            self._file.execute("PRAGMA synchronous = FULL")
-            self._file.execute("PRAGMA locking_mode = EXCLUSIVE")
-            self._file.execute("BEGIN EXCLUSIVE")
-            self._file.execute(
-                "CREATE TABLE IF NOT EXISTS hfg_ledger (part TEXT PRIMARY KEY, life INT, sum INT, data BLOB)"
-            )
-            self._file.execute("COMMIT")
+            self._file = open_database(path, _TABLES)
+        except (sqlite3.Error, OSError, ValueError) as error:
+            raise self._refuse(error) from error
+        try:
             found = self._file.execute("SELECT life, sum, data FROM hfg_ledger WHERE part = ?", (part,)).fetchone()
         except sqlite3.Error as error:
+            self._file.close()
             raise self._refuse(error) from error
         if found is not None:
             incarnation, checksum, data = found
-            if zlib.crc32(data) != checksum:
+            if not isinstance(incarnation, int) or not isinstance(data, bytes) or zlib.crc32(data) != checksum:
+                self._file.close()
                 raise RunError(
                     f'ledger "{path}" of group "{part}" is broken: its checksum does not match; restore it '
                     "from a copy, or remove it to start over"
@@ -113,9 +114,10 @@ class LedgerFile(Ledger):
         """See `Ledger`."""
         self._file.close()
 
-    def _refuse(self, error: sqlite3.Error) -> RunError:
+    def _refuse(self, error: Exception) -> RunError:
+        why = getattr(error, "strerror", None) or error
         return RunError(
-            f'ledger "{self.path}" of group "{self._part}" cannot be used: {error}; use a writable path of a '
+            f'ledger "{self.path}" of group "{self._part}" cannot be used: {why}; use a writable path of a '
             "ledger, or of a file that does not exist, that no other run or group has open"
         )
 
