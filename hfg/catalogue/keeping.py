@@ -23,7 +23,7 @@ from typing import Final
 
 import msgspec
 
-from hfg.base.private import make_private
+from hfg.base.private import make_private, unsafe_place
 from hfg.catalogue.offers import Offer, offers
 from hfg.catalogue.searching import Index, index_of
 
@@ -65,11 +65,23 @@ def _read_own(path: Path) -> bytes:
     Raises:
       OSError: there is no such file, it is too large, or another user could have written it.
     """
+    _need_safe(path)
     with open(path, "rb", opener=_without_links) as file:
         found = os.fstat(file.fileno())
         if found.st_size > _MOST or found.st_uid != os.geteuid() or found.st_mode & _WRITTEN_BY_OTHERS:
             raise PermissionError(errno.EPERM, "not a file of this user alone", str(path))
         return file.read()
+
+
+def _need_safe(path: Path) -> None:
+    """Refuse a place where another user can exchange a file for an older one of ours.
+
+    Raises:
+      OSError: it is one.
+    """
+    place = unsafe_place(path)
+    if place is not None:
+        raise PermissionError(errno.EPERM, "other users can replace what lies in it", str(place))
 
 
 def _without_links(path: str, flags: int) -> int:
@@ -85,6 +97,7 @@ def _folder() -> Path:
 def _keep(path: Path, index: Index) -> None:
     """Write the file whole or not at all, and remove older ones; without a place for it nothing is kept."""
     with contextlib.suppress(OSError, RuntimeError):
+        _need_safe(path)
         make_private(path.parent)
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix="new-", delete=False) as file:
             file.write(msgspec.json.encode(index))

@@ -20,7 +20,7 @@ import typer
 
 from hfg.base.bounds import GRAPH_FILE_BYTES
 from hfg.base.whole import read_plain
-from hfg.cli.target import load_graph
+from hfg.cli.target import load_graph, names_code
 from hfg.graph import Graph, Subgraph
 from hfg.nodetypes.node import Node
 
@@ -70,7 +70,7 @@ def _plain(offers: Iterable[str]) -> list[str]:
 def _nodes(ctx: typer.Context) -> list[tuple[str, Node]]:
     # An option without its value yet, as here, keeps typer from sorting out what stands before it.
     target = ctx.params.get("target") or next(iter(ctx.args), "")
-    if not target:
+    if not names_code(target):  # such as the name of a run: a module that lies here and is called so is not imported
         return []
     try:
         with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):

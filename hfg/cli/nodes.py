@@ -122,9 +122,11 @@ def _meant(what: str | None) -> tuple[Catalogue, bool]:
         return _only_named(_in(place), what, name), True
     if what.endswith(".py") or "/" in what or "\\" in what or Path(what).is_file() or _is_family(what):
         return _in(what), False
-    # A module from here may have any name, so what is installed goes first, and is imported while none can be.
-    if not _is_installed(what) and _is_module(what):
-        return _in(what), False
+    # What lies here may have any name, and is not imported for one word: it could be the name of a node type.
+    if not _is_installed(what):
+        _need_elsewhere(what)
+        if _is_module(what):
+            return _in(what), False
     found = catalogue.installed()
     try:
         return _only_named(found, what, what), True
@@ -166,6 +168,20 @@ def _is_module(name: str, *, also_pythons: bool = False) -> bool:
         return find_spec(name) is not None
     except (ImportError, ValueError):  # no such package around it, or no name of a module at all
         return False
+
+
+def _need_elsewhere(name: str) -> None:
+    """Refuse one word that names a module in the working directory.
+
+    Raises:
+      TargetError: it does; the message says how to name it.
+    """
+    if not name.isidentifier() or PathFinder.find_spec(name, [str(Path.cwd())]) is None:
+        return
+    clear = f"{name}.py" if Path(f"{name}.py").is_file() else f"a module in it, as in {name}.nodes"
+    raise TargetError(
+        f'no node type "{name}" is installed, and one word runs no code that lies here: if that is meant, name {clear}'
+    )
 
 
 def _only_named(found: Catalogue, what: str, name: str) -> Catalogue:

@@ -5,12 +5,10 @@ Depends on `execute` and `sockets`.
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from collections.abc import Awaitable
 from contextlib import redirect_stdout
 from itertools import islice
-from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
@@ -20,14 +18,13 @@ from hfg.cli import completing, show
 from hfg.cli.execute import GraphRun
 from hfg.cli.options import Clock, RunFlags, TargetArgument
 from hfg.cli.sockets import Line, find, is_process, which
-from hfg.cli.target import SUFFIXES, import_from_here
+from hfg.cli.target import names_code
 from hfg.engine import Run
 from hfg.engine.face.watching import Answer, Question
 from hfg.engine.observing.encoding import line_of
 from hfg.errors import GraphError, TargetError, UsageError
 
-_CODE: Final = (".py", ".yaml", ".yml", *SUFFIXES)
-_KEPT = 10_000  # more than a graph sends between two turns of the loop
+_KEPT: Final = 10_000  # more than a graph sends between two turns of the loop
 
 
 def tap(
@@ -75,19 +72,21 @@ def tap(
 
 
 def _runs_already(target: str) -> list[Answer]:
-    """The runs that a target means: a process, or the name of a graph that runs where it names no file or module."""
-    if is_process(target):
-        return find(target)
-    if ":" in target or target.endswith(_CODE) or Path(target).exists() or Path(f"{target}.py").exists():
+    """The runs that a target means: a process, or the name of a graph, which is never that of a module.
+
+    Otherwise a file that lies where one is would be carried out for the name of a run (rule L4).
+    """
+    if not is_process(target) and names_code(target):
         return []
     try:
         return find(target)
     except TargetError as error:
-        import_from_here()  # not before: what lies here could stand in for what is imported meanwhile
-        top = target.partition(".")[0]
-        if top.isidentifier() and importlib.util.find_spec(top) is not None:
-            return []
-        raise TargetError(f'there is no file or module "{target}", and {error}') from None
+        if is_process(target):
+            raise
+        raise TargetError(
+            f'{error}; "{target}" names a run: to run a graph, name its file, as in hfg tap {target}.py, or its '
+            "module with the graph, as in package.module:graph"
+        ) from None
 
 
 def _look_at(name: str, question: Question, limit: int | None) -> int:

@@ -80,6 +80,11 @@ def load_graph(target: str, given: Sequence[str] | None = None, allow: Sequence[
     return graph
 
 
+def names_code(target: str) -> bool:
+    """Say whether a target names a file or a graph in a module; one word may mean something else."""
+    return target.endswith((".py", ".yaml", ".yml", *SUFFIXES)) or any(sign in target for sign in ":/\\")
+
+
 def load_module(place: str) -> ModuleType:
     """Import a module by name, or a Python file by its path.
 

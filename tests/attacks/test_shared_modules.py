@@ -76,7 +76,7 @@ def test_no_module_is_imported_from_a_folder_of_all_users(shared: Path, target: 
         load_graph(target)
 
 
-@pytest.mark.parametrize("arguments", [("run", "planted_module:graph"), ("tap", "planted_module", "a.out")])
+@pytest.mark.parametrize("arguments", [("run", "planted_module:graph"), ("tap", "planted_module:graph", "a.out")])
 def test_no_name_of_a_module_or_run_runs_code_in_a_folder_of_all_users(
     shared: Path, arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -136,3 +136,38 @@ def test_a_run_is_looked_for_before_modules_of_the_folder_can_be_imported(
 
     monkeypatch.setattr("hfg.cli.tap.find", finds)
     assert main(["tap", "fetch", "camera.out"]) == 2
+
+
+@pytest.mark.parametrize("place", ["fetch.py", "fetch/__init__.py"])
+def test_the_name_of_a_run_is_never_that_of_a_module(
+    strange: Path, place: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A folder from somebody else would run code because its user looks at a run from within it."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(strange / "state"))
+    (strange / place).parent.mkdir(exist_ok=True)
+    (strange / place).write_text(PLANTED + GRAPH)
+    assert main(["tap", "fetch", "camera.out"]) == 2
+    assert '"fetch" names a run: to run a graph, name its file, as in hfg tap fetch.py' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("line", ["hfg tap fetch c", "hfg run fetch --param x", "hfg check fetch --param x"])
+def test_the_tab_key_imports_nothing_for_one_word(strange: Path, line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    (strange / "fetch.py").write_text(PLANTED + GRAPH)
+    monkeypatch.setenv("_HFG_COMPLETE", "complete_fish")
+    monkeypatch.setenv("_TYPER_COMPLETE_FISH_ACTION", "get-args")
+    monkeypatch.setenv("_TYPER_COMPLETE_ARGS", line)
+    with pytest.raises(SystemExit):
+        main([])
+
+
+@pytest.mark.parametrize(("place", "named"), [("webcam.py", "webcam.py"), ("webcam/__init__.py", "webcam.nodes")])
+def test_to_look_up_a_type_that_is_not_installed_runs_no_code_of_the_folder(
+    strange: Path, place: str, named: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(strange / "cache"))
+    monkeypatch.setattr("hfg.catalogue.finding.offers", lambda: (catalogue.Offer("hfg.nodes.logic"),))
+    monkeypatch.setattr("hfg.catalogue.keeping.offers", lambda: (catalogue.Offer("hfg.nodes.logic"),))
+    (strange / place).parent.mkdir(exist_ok=True)
+    (strange / place).write_text(PLANTED)
+    assert main(["nodes", "webcam"]) == 2
+    assert named in capsys.readouterr().err

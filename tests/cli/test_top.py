@@ -119,7 +119,8 @@ def test_of_several_runs_one_must_be_named(command: Command, place: Path) -> Non
             assert f"no graph that could be looked at runs in process 4242; {there}" in shown.err
         shown = command("tap", "third", "ticks.out")
         assert (shown.code, shown.err.count("\n")) == (2, 1)
-        assert 'there is no file or module "third", and no graph that could be looked at runs by the name' in shown.err
+        assert 'no graph that could be looked at runs by the name "third"' in shown.err
+        assert '"third" names a run: to run a graph, name its file' in shown.err
         assert there in shown.err
 
 
