@@ -118,6 +118,10 @@ def view_of(head: ArrayHead, buffer: Any, offset: int) -> np.ndarray[Any, Any]:
 
 def unsafe_content(array: np.ndarray[Any, Any]) -> str | None:
     """Return which bytes numpy must not see: it counts booleans by adding them up, and does not check characters."""
+    if array.dtype.names is not None:
+        return next(
+            filter(None, (unsafe_content(np.ascontiguousarray(array[name])) for name in array.dtype.names)), None
+        )
     kind = array.dtype.kind
     if kind == "b" and array.size and array.view(np.uint8).max() > 1:
         return "an array of booleans holds values other than 0 and 1"

@@ -1,6 +1,6 @@
 """Decodes values from plain data by their declared type, and finds code by reference; see `data`.
 
-Depends on types, values and `records`.
+Depends on types, values, `plain` and `records`.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ import msgspec
 import numpy as np
 
 from hfg.base.values import Colour, Span, same
+from hfg.encoding.plain import need_spread
 from hfg.encoding.records import hints_of, imported, names_of
 from hfg.errors import EncodingError
 from hfg.types import accepts, bare_type, describe
@@ -168,11 +169,15 @@ def _pairs(data: Any, key: Any, item: Any, where: str, find: Find) -> dict[Any, 
     if not _is_list(data) or not all(_is_list(one) and len(one) == 2 for one in data):
         raise EncodingError(f"{where} must be a mapping, or a list of pairs [key, value], got {data!r:.80}")
     try:
-        return {
-            decoded(one, key, f"{where}, key {one!r:.40}", find): decoded(other, item, f"{where}[{one!r:.40}]", find)
+        pairs = [
+            (decoded(one, key, f"{where}, key {one!r:.40}", find), decoded(other, item, f"{where}[{one!r:.40}]", find))
             for one, other in data
-        }
-    except TypeError as error:  # a key that cannot be hashed
+        ]
+        need_spread([one for one, _ in pairs])
+        return dict(pairs)
+    except (TypeError, ValueError) as error:  # a key that cannot be hashed
+        if isinstance(error, EncodingError):
+            raise
         raise EncodingError(f"{where} has an invalid key ({error})") from None
 
 
@@ -234,8 +239,9 @@ class _Decoder:
 
     def set_of(self, cls: Any, items: list[Any]) -> Any:
         try:
+            need_spread(items)
             return cls(items)
-        except TypeError as error:
+        except (TypeError, ValueError) as error:
             raise EncodingError(f"{self.where} has an invalid member ({error})") from None
 
     def untyped(self, data: Any) -> Any:

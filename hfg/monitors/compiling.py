@@ -90,9 +90,9 @@ class _Writer:
                 self._say(f"{value} = {state}", f"{state} = {held}")
             case Times(times, of, within_s):
                 held = self.write(of)
-                self._states[state] = f"deque([NEVER] * {times}, {times})"
+                self._states[state] = f"deque((), {times})"
                 self._say(f"if {held}: {state}.append(t)")
-                self._say(f"{value} = {state}[0] != NEVER and t - {state}[0] <= {_number(within_s)}")
+                self._say(f"{value} = len({state}) == {times} and t - {state}[0] <= {_number(within_s)}")
             case Since():
                 self._since(value, state, formula)
             case _:

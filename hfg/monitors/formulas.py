@@ -20,6 +20,9 @@ from hfg.monitors.conditions import Condition, parse_condition
 
 _PLAIN: Final = re.compile(r"[^\s,()&|~\"]+")
 
+MOST_POINTS: Final = 1_000_000
+"""That `at_least` counts: it remembers the time of each (rule L4)."""
+
 
 class Formula:
     """What is true or false at each point; combine formulas with `&`, `|`, `~` and `implies`."""
@@ -254,8 +257,8 @@ def throughout(formula: Formula, *, last_s: float = math.inf) -> Formula:
 
 def at_least(number: int, formula: Formula, *, within_s: float = math.inf) -> Formula:
     """It has held at `number` points of the last `within_s` seconds, this one included: a count, or a rate."""
-    if type(number) is not int or number < 1:
-        raise UsageError(f"at_least(number, ...) counts points, from 1 on, got {number!r}")
+    if type(number) is not int or not 1 <= number <= MOST_POINTS:
+        raise UsageError(f"at_least(number, ...) counts points, from 1 to {MOST_POINTS:,}, got {number!r:.40}")
     return Times(number, need_formula(formula, "at_least"), _bounds("at_least", 0.0, within_s)[1])
 
 

@@ -160,7 +160,7 @@ class _Reading(ConditionReading):
 
     def at_least(self, name: Token) -> Formula:
         at, number = self.next().at, self.number()
-        if number != int(number):
+        if not number.is_integer():
             self.wrong(at, f"at_least counts points, got {number:g}; give a whole number")
         self.need(",", "after the number of at_least")
 

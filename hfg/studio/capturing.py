@@ -26,6 +26,8 @@ __all__ = ["level_as_svg", "value_as_file"]
 
 _MOST_BYTES: Final = 16 << 20
 _MOST_DIMENSIONS: Final = 2
+_FORMULAS: Final = ("=", "+", "-", "@", "\t", "\r", "\n")
+"""With which a spreadsheet begins a formula, which may start programs and send what is in the sheet (rule L4)."""
 
 
 def level_as_svg(graph: Graph, path: str, view: str) -> dict[str, str]:
@@ -70,8 +72,13 @@ def _npy(value: object) -> bytes:
 
 def _csv(value: object) -> bytes:
     written = io.StringIO()
-    csv.writer(written).writerows(_rows(value))
+    csv.writer(written).writerows([_harmless(cell) for cell in row] for row in _rows(value))
     return written.getvalue().encode()
+
+
+def _harmless(cell: object) -> object:
+    """Return a cell that a spreadsheet takes for what it is: a text that it would calculate gets an apostrophe."""
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULAS) else cell
 
 
 def _rows(value: object) -> Iterable[list[Any]]:

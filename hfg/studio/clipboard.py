@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from typing import Any, Final
 
 import msgspec
@@ -33,18 +33,19 @@ def text_of_nodes(graph: Graph, paths: Iterable[str]) -> str:
     if len({path.rpartition("/")[0] for path in chosen}) > 1:
         raise Refused("usage", "nodes are copied from one level at a time")
     within = [one for one in graph.as_commands() if not isinstance(one, _LEFT_OUT) and _is_within(one, chosen)]
-    copied = (ways_among(one, lambda path: any(_node_of(path, node) for node in chosen)) for one in within)
+    copied = (ways_among(one, lambda path: _node_in(path, chosen) is not None) for one in within)
     return c.encode([one for one in copied if one is not None])
 
 
-def _is_within(command: c.Command, chosen: set[str]) -> bool:
+def _is_within(command: c.Command, chosen: Container[str]) -> bool:
     said = [getattr(command, name) for name in _PATHS if isinstance(getattr(command, name, None), str)]
-    return bool(said) and all(any(_node_of(one, path) for path in chosen) for one in said)
+    return bool(said) and all(_node_in(one, chosen) is not None for one in said)
 
 
-def _node_of(path: str, node: str) -> bool:
-    """Whether a path leads to a node, into it or to a port of it."""
-    return path == node or path.startswith((f"{node}/", f"{node}."))
+def _node_in(path: str, nodes: Container[str]) -> str | None:
+    """Return the outermost of some nodes that a path leads to, into or to a port of; None if there is none."""
+    ends = [number for number, letter in enumerate(path) if letter in "/."]
+    return next((path[:end] for end in (*ends, len(path)) if path[:end] in nodes), None)
 
 
 def pasted(graph: Graph, text: str, level: str, allow: Iterable[str]) -> list[Any]:
@@ -58,14 +59,15 @@ def pasted(graph: Graph, text: str, level: str, allow: Iterable[str]) -> list[An
     if around is None:
         raise GraphError(f'"{level}" is not a subgraph, so nothing is inside it')
     names: dict[str, str] = {}
-    tops = _tops(commands)
     taken: set[str] = set()
-    for top in tops:
+    numbers: dict[str, int] = {}  # the last that was tried after a name: a text may have one name many times
+    for top in _tops(commands):
         base = top.rpartition("/")[2]
-        name, number = base, 1
+        name, number = base, numbers.get(base, 1)
         while name in around.nodes or name in taken:
             number += 1
             name = f"{base}_{number}"
+        numbers[base] = number
         taken.add(name)
         names[top] = f"{level}/{name}" if level else name
     plain = msgspec.json.decode(c.encode([_moved(one, names) for one in commands]))
@@ -75,13 +77,14 @@ def pasted(graph: Graph, text: str, level: str, allow: Iterable[str]) -> list[An
 
 def _tops(commands: Iterable[c.Command]) -> list[str]:
     """Return the outermost nodes that are added; all others are inside them."""
-    added = [one.path for one in commands if isinstance(one, c.Add | c.AddSubgraph)]
-    return [path for path in added if not any(_node_of(path, other) for other in added if other != path)]
+    added = {one.path: None for one in commands if isinstance(one, c.Add | c.AddSubgraph)}
+    return [path for path in added if _node_in(path, added) == path]
 
 
 def _moved(command: c.Command, names: Mapping[str, str]) -> c.Command:
     def named(path: str) -> str:
-        return next((new + path[len(old) :] for old, new in names.items() if _node_of(path, old)), path)
+        old = _node_in(path, names)
+        return path if old is None else names[old] + path[len(old) :]
 
     said = {field: one for field in _PATHS if isinstance(one := getattr(command, field, None), str)}
     moved = msgspec.structs.replace(command, **{field: named(path) for field, path in said.items()})

@@ -81,7 +81,7 @@ def test_formulas_say_themselves_in_the_words_that_made_them() -> None:
         (lambda: m.once(P, within_s=-1), "once looks back by seconds from 0 on"),
         (lambda: m.once(P, at_least_s=3, within_s=2), "the least first, got at least 3 and at most 2"),
         (lambda: m.once(P, within_s=float("nan")), "got at least 0.0 and at most nan"),
-        (lambda: m.at_least(0, P), "counts points, from 1 on, got 0"),
+        (lambda: m.at_least(0, P), "counts points, from 1 to 1,000,000, got 0"),
         (lambda: m.sent(3), "sent takes a port of the graph, given itself or by path, got 3"),
         (
             lambda: m.sent("a.out", when=3),  # type: ignore[arg-type]

@@ -114,7 +114,7 @@ def read(data: str | bytes) -> Sequence[Command]:
     """
     try:
         return _decoder().decode(data)
-    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
         raise GraphError(f"this is not a list of commands: {error}") from error
 
 

@@ -44,7 +44,7 @@ from hfg.graph.structure.facts import Fact, facts_of, refuse_fact
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.given import edge_options, group_spec
 from hfg.graph.structure.level import Level, inside, level_of, nodes_within
-from hfg.graph.structure.monitors import monitor_spec
+from hfg.graph.structure.monitors import monitor_spec, with_monitor
 from hfg.graph.structure.options import EdgeGiven, GroupGiven, MonitorGiven, MonitorSpec, NodeGiven
 from hfg.graph.structure.places import side_of
 from hfg.nodetypes.node import Node
@@ -93,6 +93,7 @@ class Steps:
         self._multiplied = multiplied
         self.changes: list[Change] = []
         self.find = find
+        self._promoting: tuple[PromotionChange, int] | None = None  # the last one, and how many changes there were then
 
     def need_room(self, node: Node, *, copy: bool = False) -> None:
         """Check that a node with its vectors of ports is not too much for a graph; of a copy, with all inside it.
@@ -115,6 +116,7 @@ class Steps:
         """Undo all changes after the first `count`."""
         undo_all(self.changes[count:])
         del self.changes[count:]
+        self._promoting = None
 
     def gated_levels(self) -> list[Level]:
         """Return the levels that have gates."""
@@ -255,9 +257,18 @@ class Steps:
         """Let a parameter of a subgraph stand for an inner one, which takes its value."""
         around = level_of(inner.node.place.graph)
         refuse_promotion(around, outer, inner)
+        last, is_last = self._promoting, len(self.changes)
         self.write(inner, outer.value)
-        promoted = around.promotions.copied()
-        self.set_promotions(around, promoted | {outer.name: [*promoted.get(outer.name, []), inner]})
+        if last is not None and last[0].level is around and last[1] == is_last:  # one change for many in a row
+            change = last[0]
+            around.promotions.add(outer.name, inner)
+            change.after.setdefault(outer.name, []).append(inner)
+        else:
+            before, after = around.promotions.copied(), around.promotions.copied()
+            after.setdefault(outer.name, []).append(inner)
+            change = PromotionChange(around, before, after)
+            self.do(change)
+        self._promoting = change, len(self.changes)
 
     def set_promotions(self, level: Level, promoted: Promoted) -> None:
         """Let other parameters stand for the inner ones, if that changes anything."""
@@ -283,7 +294,7 @@ class Steps:
 
     def declare_monitor(self, name: str, property_: object, said: MonitorGiven) -> None:
         """Declare a monitor, or declare it otherwise."""
-        self.set_monitors({**self.root.whole.monitors, name: monitor_spec(name, property_, said)})
+        self.set_monitors(with_monitor(self.root.whole.monitors, monitor_spec(name, property_, said)))
 
     def declare_port(self, kind: Literal["input", "output"], name: str, type_: str) -> None:
         """Declare a port of the whole graph; its type is a string."""

@@ -6,7 +6,7 @@ Their paths begin at the outermost graph. Depends on `level`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Final
 
 from hfg.base.controls import name_problem
 from hfg.errors import GraphError, UsageError
@@ -16,6 +16,23 @@ from hfg.graph.structure.options import MonitorFields, MonitorSpec
 from hfg.graph.structure.refusals import Refusable
 from hfg.monitors.parsing import parse
 from hfg.monitors.properties import Property
+
+MOST_MONITORS: Final = 1_000
+"""The history of edits keeps all monitors for each that was declared, and a file may hold many (rule L4)."""
+
+
+def with_monitor(known: Mapping[str, MonitorSpec], spec: MonitorSpec) -> Mapping[str, MonitorSpec]:
+    """Return monitors and one more, or another in the place of one of them.
+
+    Raises:
+      GraphError: they are too many.
+    """
+    if len(known) >= MOST_MONITORS and spec.name not in known:
+        raise GraphError(
+            f'monitor "{spec.name}": the graph declares {MOST_MONITORS:,} monitors already, as many as are allowed; '
+            "join formulas with &, or call monitors.watch(run, ...)"
+        )
+    return {**known, spec.name: spec}
 
 
 def monitor_spec(name: str, property_: object, given: Mapping[str, Any]) -> MonitorSpec:
@@ -64,7 +81,7 @@ def declare_monitor(level: Level, name: str, property_: object, given: Mapping[s
             raise GraphError(
                 f'monitor "{name}" is declared already, as {known.property}; declare it once, or choose another name'
             )
-        level.whole.set_monitors({**level.whole.monitors, name: spec})
+        level.whole.set_monitors(with_monitor(level.whole.monitors, spec))
         return spec
     return None
 

@@ -6,7 +6,8 @@ import csv
 import errno
 import io
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
@@ -19,7 +20,7 @@ from hfg.encoding.plain import json_value
 from hfg.images import AnyImage, Image
 from hfg.nodes._extras import require
 from hfg.nodes.files.access import FilePath, named, reaching, read_whole
-from hfg.nodes.files.arrays import need_fair_arrays
+from hfg.nodes.files.arrays import need_fair_arrays, read_rows, sound
 from hfg.nodetypes.functions import node
 from hfg.types import Array
 
@@ -189,7 +190,7 @@ def _cell(text: str, name: str, guess: bool, columns: Mapping[str, Column]) -> A
     return text
 
 
-def load_array(path: Path, mode: Literal["r"] | None = None) -> Any:
+def load_array(path: Path) -> Any:
     """Read a file of numpy, without running what pickles would.
 
     Raises:
@@ -197,20 +198,47 @@ def load_array(path: Path, mode: Literal["r"] | None = None) -> Any:
       ValueError: it is not such a file.
     """
     with reaching(path, "read"):
-        with path.open("rb") as file:  # a directory or a missing file is told by the system, not by numpy
-            is_zip = file.read(2) == b"PK"
-        try:
+        is_zip = _is_zip(path)
+        with _understood(path):
             if is_zip and not zipfile.is_zipfile(path):
                 raise ValueError("its end is missing")  # numpy would leave it open
-            need_fair_arrays(path, is_zip=is_zip, whole=mode is None)
-            return np.load(path, mmap_mode=mode, allow_pickle=False)
-        except Exception as error:  # what numpy and zipfile raise, whatever is in a file: a dozen kinds
-            if _is_of_the_system(error):
-                raise
-            raise ValueError(
-                f'"{path}" is not a numpy file without Python objects: {error}; write it again with numpy.save or '
-                "numpy.savez"
-            ) from None
+            need_fair_arrays(path, is_zip=is_zip)
+            found = np.load(path, allow_pickle=False)
+            return sound(found) if isinstance(found, np.ndarray) else found
+
+
+def rows_of_array(path: Path) -> Iterable[Array]:
+    """Read an array of a `.npy` file along its first axis; the file may be larger than the memory.
+
+    Raises:
+      OSError: it cannot be read.
+      ValueError: it is not such a file, or has no rows.
+    """
+    with reaching(path, "read"):
+        if _is_zip(path):
+            raise ValueError(f'"{path}" has no rows because it holds several arrays')
+        with _understood(path):
+            found = read_rows(path)
+    return load_array(path) if found is None else found
+
+
+def _is_zip(path: Path) -> bool:
+    with path.open("rb") as file:  # a directory or a missing file is told by the system, not by numpy
+        return file.read(2) == b"PK"
+
+
+@contextmanager
+def _understood(path: Path) -> Iterator[None]:
+    """Report in one message that a file is not one of numpy, and why."""
+    try:
+        yield
+    except Exception as error:  # what numpy and zipfile raise, whatever is in a file: a dozen kinds
+        if _is_of_the_system(error):
+            raise
+        raise ValueError(
+            f'"{path}" is not a numpy file without Python objects: {error}; write it again with numpy.save or '
+            "numpy.savez"
+        ) from None
 
 
 def _is_of_the_system(error: Exception) -> bool:
@@ -260,7 +288,7 @@ def read_arrays(path: FilePath) -> dict[str, Array]:
         raise ValueError(f'"{path}" holds one array: use read_array')
     with found, reaching(place, "read"):
         try:
-            return {name: found[name] for name in found.files}
+            return {name: sound(found[name]) for name in found.files}
         except Exception as error:  # see `load_array`
             if _is_of_the_system(error):
                 raise

@@ -9,14 +9,13 @@ from collections.abc import AsyncIterator, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 from annotated_types import MaxLen, MinLen, Predicate
 
 from hfg.errors import EndOfStream
 from hfg.images import Image
 from hfg.nodes.files.access import find_files, is_a_path, lines_of, named, reaching
 from hfg.nodes.files.keyboard import lines_of_standard_input
-from hfg.nodes.files.reading import Column, json_of, load_array, load_image, rows_of
+from hfg.nodes.files.reading import Column, json_of, load_image, rows_of, rows_of_array
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Output, Parameter, State, slot
 from hfg.types import Array
@@ -177,16 +176,12 @@ class ArrayRows(Node):
     def process(self) -> Iterator[Array]:
         """Read it."""
         place = named(self.path)
-        whole = load_array(place, "r")
-        if not isinstance(whole, np.ndarray) or not whole.ndim:
-            what = "one value" if isinstance(whole, np.ndarray) else "several arrays"
-            raise ValueError(f'"{place}" has no rows because it holds {what}')
         some = True
         while some:
             some = False
-            for row in whole:
+            for row in rows_of_array(place):
                 some = self.loop
-                yield np.array(row)
+                yield row
 
 
 class _Player(Node):
