@@ -17,7 +17,7 @@ import numpy as np
 
 from hfg.errors import UsageError
 from hfg.recording.messages import EVENTS
-from hfg.recording.reading import number_in
+from hfg.recording.reading import nanoseconds_in
 from hfg.recording.seeking import Seeking
 
 _MOST_SPANS: Final = 500_000
@@ -83,7 +83,7 @@ class Course:
     def read(self) -> Iterator[None]:
         """Read the recording; each step is one chunk."""
         file = self._seeking.file
-        (channel,) = file.numbers_of(EVENTS) or (0,)
+        channel = min(file.numbers_of(EVENTS), default=0)
         for _, messages in self._seeking.parts(channel):
             events: list[tuple[dict[str, Any], int]] = []
             for data in messages:
@@ -99,7 +99,7 @@ class Course:
             self.turn += 1
 
     def _take(self, event: dict[str, Any], size: int) -> None:
-        at = int(number_in(event.get("time")) * 1e9)
+        at = nanoseconds_in(event.get("time"))
         node = str(event.get("node"))
         match event.get("type"):
             case "ActivityChanged":

@@ -8,7 +8,6 @@ package `mcap`.
 
 from __future__ import annotations
 
-import mmap
 import re
 import struct
 import zlib
@@ -27,7 +26,7 @@ from hfg.recording.mcap import MAGIC
 
 _FOOTER: Final = HEAD.size + 20 + len(MAGIC)
 _LONGEST_RECORD: Final = 64 * 2**20  # except chunks, messages and attachments
-_PIECE: Final = 4 * 2**20  # bytes of messages outside chunks that are read at once
+_PIECE: Final = 4 * 2**20  # bytes that are read at once: of messages outside chunks, and where a chunk is looked for
 _LOOKS_LIKE_A_CHUNK: Final = re.compile(
     rb"\x06.{5}\x00{3}.{28}(?:\x03\x00{3}lz4|\x04\x00{3}zstd|\x00{4}).{5}\x00{3}", re.DOTALL
 )
@@ -260,12 +259,16 @@ class Layout:
         if self._places:
             found = self._next_indexed(at - 1, end)
             return None if found >= end else found
-        with mmap.mmap(self._stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            for match in _LOOKS_LIKE_A_CHUNK.finditer(data, at, end):
-                begin = match.start()
-                _, length = HEAD.unpack_from(data, begin)
+        while at < end:  # piece by piece: if another user cuts a file meanwhile, mapped memory kills the process
+            data = self._at(at, min(_PIECE, end - at))
+            for match in _LOOKS_LIKE_A_CHUNK.finditer(data):
+                begin = at + match.start()
+                _, length = HEAD.unpack_from(data, match.start())
                 if begin + HEAD.size + length <= end and self._is_chunk(begin + HEAD.size, length):
                     return begin
+            if len(data) < _PIECE:
+                return None
+            at += _PIECE - _HEAD_OF_A_CHUNK  # it may begin in one piece and end in the next
         return None
 
     def _is_chunk(self, at: int, length: int) -> bool:
@@ -349,7 +352,10 @@ class Layout:
         """Return kind and length of a record that ends before `end`."""
         if at + HEAD.size > end:
             raise Damaged("a record is incomplete")
-        opcode, length = HEAD.unpack(self._at(at, HEAD.size))
+        head = self._at(at, HEAD.size)
+        if len(head) < HEAD.size:
+            raise Damaged("the file has become shorter")
+        opcode, length = HEAD.unpack(head)
         if opcode == 0 or _LAST_OPCODE < opcode < _FIRST_PRIVATE:
             raise Damaged("a record is not valid")
         if length > end - at - HEAD.size:

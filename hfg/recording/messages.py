@@ -19,7 +19,7 @@ from hfg.encoding.pictures import need_fair_size
 from hfg.errors import UsageError
 from hfg.recording import foxglove, schemas
 from hfg.recording.forms import is_plain
-from hfg.recording.values import CannotKeep, Codec
+from hfg.recording.values import CannotKeep, Codec, sound
 from hfg.trace import TraceEvent
 from hfg.types import describe, describe_value
 
@@ -289,7 +289,7 @@ class TokenReader:
         """
         if self._schema_name == "foxglove.RawImage":
             data = base64.b64decode(message["data"])
-            value: Any = np.frombuffer(bytearray(data), message["dtype"]).reshape(message["shape"])
+            value: Any = sound(np.frombuffer(bytearray(data), message["dtype"]).reshape(message["shape"]))
         elif self._schema_name == "foxglove.CompressedImage":
             value = _decompress(message["data"], message["shape"])
         else:

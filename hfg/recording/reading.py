@@ -6,6 +6,7 @@ contents, and the loss is reported (rule L4). Depends on `layout` and `chunks`.
 
 from __future__ import annotations
 
+import math
 import os
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterator, Mapping
@@ -25,6 +26,7 @@ from hfg.recording.messages import EVENTS, MARKERS
 _KEPT_CHUNKS: Final = 8
 _KEPT_BYTES: Final = 64 * 2**20
 _MOST_TOLD: Final = 100
+_FURTHEST_NS: Final = 2.0**62
 RECOVERED: Final = "hfg:recovered"
 """The metadata in which a recovered file lists its losses."""
 
@@ -397,6 +399,12 @@ def number_in(said: object) -> float:
         return float(said)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
         return 0.0
+
+
+def nanoseconds_in(said: object) -> int:
+    """Return the seconds in a file's data as nanoseconds of 64 bits; 0 if they are not a finite number."""
+    seconds = number_in(said)
+    return int(min(max(seconds * 1e9, -_FURTHEST_NS), _FURTHEST_NS)) if math.isfinite(seconds) else 0
 
 
 def _counts(said: str) -> dict[str, int]:

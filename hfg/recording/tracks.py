@@ -21,6 +21,7 @@ from hfg.types import accepts, describe
 
 _PROCESSED = "processed"
 _MOST_LOST: Final = 100_000  # firings; larger numbers are not trusted because a file can contain any number
+_MOST_LOST_IN_ALL: Final = 1_000_000
 
 
 class Record(msgspec.Struct):
@@ -138,6 +139,7 @@ class Track:
         self._events = file.numbers_of(EVENTS)
         self._kinds: dict[str, str] = {}  # "output", "sent", "processed", "event" by port
         self._node = ""
+        self._lost = 0  # firings that were put in for those that a damaged file has lost
         self.of_source = False
         for number, channel in file.channels.items():
             if channel.topic in ports:
@@ -158,6 +160,7 @@ class Track:
         So later tokens meet the same tokens in a join as before.
         """
         last: Step | None = None
+        self._lost = 0
         for step in self._steps():
             if step.fires:
                 yield from self._lost_between(last, step)
@@ -168,8 +171,9 @@ class Track:
         """Yield the lost firings between two firings, or before the first one, evenly spaced in time."""
         before, began = (last.number, last.when) if last is not None else (0, self.began)
         lost = step.number - before - 1
-        if lost < 1 or lost > _MOST_LOST or not self._file.losses_met():
+        if not 1 <= lost <= min(_MOST_LOST, _MOST_LOST_IN_ALL - self._lost) or not self._file.losses_met():
             return
+        self._lost += lost
         for number in range(1, lost + 1):
             when = min(began + (step.began - began) * number / (lost + 1), step.began)
             yield Step(when, when, fires=True, number=before + number)
@@ -303,6 +307,7 @@ def _is_sound(message: dict[str, Any]) -> bool:
         isinstance(message.get("stamp"), _NUMBERS)
         and message.get("activity", 0) in (-1, 0, 1)
         and all(isinstance(message.get(name) or 0, _NUMBERS) for name in ("sequence", "call", "time", "began"))
+        and isinstance(message.get("firing", 0), int)
         and isinstance(message.get("port", ""), str)
     )
 

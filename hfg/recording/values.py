@@ -25,11 +25,14 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
+from hfg.encoding.arrays import unsafe_content
+from hfg.encoding.plain import need_spread
 from hfg.encoding.records import imported
 from hfg.errors import HfgError
 from hfg.recording.forms import bare, fields_of, form_of, reference
 
 _TAG: Final = "$type"
+_HASHED: Final = ("set", "frozenset")
 _NONE: Final = type(None)
 
 
@@ -48,7 +51,19 @@ def array_fields(value: np.ndarray[Any, Any]) -> dict[str, Any]:
 def _array(fields: Any) -> np.ndarray[Any, Any]:
     descr = fields["dtype"]
     dtype = np.dtype(descr) if isinstance(descr, str) else np.lib.format.descr_to_dtype(_as_tuples(descr))
-    return np.frombuffer(bytearray(base64.b64decode(fields["data"])), dtype).reshape(fields["shape"])
+    return sound(np.frombuffer(bytearray(base64.b64decode(fields["data"])), dtype).reshape(fields["shape"]))
+
+
+def sound(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Return an array whose bytes numpy takes for what they are.
+
+    Raises:
+      CannotKeep: it does not.
+    """
+    problem = unsafe_content(array)
+    if problem is not None:
+        raise CannotKeep(problem)
+    return array
 
 
 def _as_tuples(descr: Any) -> Any:
@@ -290,11 +305,13 @@ class Codec:
             case "list":
                 return [self._revived(one) for one in data["value"]]
             case "dict":
-                return {self._revived(key): self._revived(one) for key, one in data["value"]}
+                pairs = [(self._revived(key), self._revived(one)) for key, one in data["value"]]
+                need_spread([key for key, _ in pairs])
+                return dict(pairs)
             case "array":
                 return _array(data)
             case "number":
-                return np.frombuffer(base64.b64decode(data["data"]), data["dtype"])[0]
+                return sound(np.frombuffer(base64.b64decode(data["data"]), data["dtype"]))[0]
             case "path":
                 return pathlib.Path(data["value"])
             case "enum":
@@ -308,7 +325,10 @@ class Codec:
         if read is None:
             raise CannotKeep(f'values of kind "{name}" are unknown here: was it recorded with a newer hfg?')
         plain = data["value"]
-        return read([self._revived(one) for one in plain] if type(plain) is list else plain)
+        members = [self._revived(one) for one in plain] if type(plain) is list else plain
+        if name in _HASHED:
+            need_spread(members)
+        return read(members)
 
     def _unpickled(self, data: Any) -> Any:
         if not self._may_pickle:

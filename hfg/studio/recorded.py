@@ -28,7 +28,7 @@ from hfg.graph.structure.paths import node_at
 from hfg.recording.chunks import Damaged
 from hfg.recording.course import Course
 from hfg.recording.messages import EVENTS, TokenReader
-from hfg.recording.reading import File, number_in
+from hfg.recording.reading import File, nanoseconds_in, number_in
 from hfg.recording.seeking import Found, Seeking
 from hfg.recording.tracks import recorded_ports
 
@@ -36,6 +36,8 @@ __all__ = ["Recorded", "Values"]
 
 _KEPT_BYTES: Final = 64 * 2**20
 _MOST_KEPT: Final = 256
+_MOST_GAPS: Final = 100
+"""Parts of a graph that cannot be built: to find each takes a check of all that was built (rule L4)."""
 
 
 class Recorded:
@@ -102,17 +104,17 @@ class Recorded:
 
     def _beginning(self) -> int:
         seeking = self.seeking
-        (events,) = seeking.file.numbers_of(EVENTS) or (0,)
+        events = min(seeking.file.numbers_of(EVENTS), default=0)
         first = seeking.after([events], -1)
         found = None if first is None else seeking.latest(events, first)
         if found is not None:
             try:
                 event = seeking.file.object_in(seeking.read(found))
                 if event.get("type") == "RunStarted":
-                    return int(number_in(event.get("time")) * 1e9)
+                    return nanoseconds_in(event.get("time"))
             except (Damaged, UsageError):
                 pass  # the description of the run says it, too
-        said = int(number_in(self._about.get("began", 0.0)) * 1e9)
+        said = nanoseconds_in(self._about.get("began", 0.0))
         return said if 0 < said <= seeking.first else seeking.first
 
     # --- the graph ----------------------------------------------------------------------------------------------------
@@ -145,13 +147,20 @@ class Recorded:
     def _build_in_parts(self, graph: Graph) -> None:
         """Build a graph of which some types are not there."""
         commands = read(self._commands)
-        for command in commands:
+        left = [commands]
+        while left and len(self.gaps) < _MOST_GAPS:
+            some = left.pop()
             try:
-                graph.edit(*decode(encode([command]), allow=self._allow))
+                graph.edit(*decode(encode(some), allow=self._allow))
             except HfgError as error:
+                if len(some) > 1:
+                    left += [some[len(some) // 2 :], some[: len(some) // 2]]
+                    continue
                 self._misses(str(error))
-                if isinstance(command, Add):
-                    _stand_in(graph, command, commands, str(error))
+                if isinstance(some[0], Add):
+                    _stand_in(graph, some[0], commands, str(error))
+        if left:
+            self._misses("more of the graph cannot be built, and the rest of it is not shown")
 
     def _misses(self, what: str) -> None:
         if what not in self.gaps:
