@@ -70,6 +70,8 @@ def test_line_works_as_written(command: Command, line: list[str], monkeypatch: p
         command("convert", "robot.py", "robot.hfg.yaml")
     if "run.mcap" in arguments[:2]:
         command("record", "robot.py", "-o", "run.mcap")
+    if arguments[0] == "check" and "--profile" in arguments:
+        command("run", "robot.py", "--profile", "robot.json")
     shown = command(*arguments)
     looks_at_a_run = "top" in arguments or "4711" in arguments or arguments[1] == "fetch"
     assert shown.code == (NOTHING_RUNS if looks_at_a_run else 0), shown.err
