@@ -246,6 +246,11 @@ def yolo_boxes(
       threshold: least score.
       overlap: greatest share of intersection by union (IoU) of two boxes of a class.
 
+    Returns:
+      boxes: left, upper edge, width, height in pixels of the picture; the surest first.
+      scores: how sure each is, 0 to 1.
+      classes: number of its class, from 0.
+
     Raises:
       ValueError: the first result has another shape.
     """
@@ -288,6 +293,11 @@ def ssd_boxes(
       height: of the input of the network.
       threshold: least score.
       overlap: greatest share of intersection by union (IoU) of two boxes of a class.
+
+    Returns:
+      boxes: left, upper edge, width, height in pixels of the picture; the surest first.
+      scores: how sure each is, 0 to 1.
+      classes: number of its class, from 0.
 
     Raises:
       ValueError: the first result has another shape.
