@@ -80,6 +80,7 @@ CASES = {
     name: Case(partial(bounds_and_ages, in_threads), PICTURES, "ms")
     for name, in_threads in (("on the loop", False), ("in threads", True))
 }
+SKIPPED: dict[str, str] = {}
 GOALS = [
     Goal(f"on the loop, {one} / {other}", Side("on the loop", one), Side("on the loop", other), 1.1)
     for one, other in (("bound", "measured"), ("measured", "bound"))
