@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from annotated_types import Interval
@@ -12,6 +13,7 @@ from examples.follow_person.perception.clothes import is_in
 from examples.follow_person.perception.records import Look, Person, Scene
 from hfg.nodes.estimation import Track
 
+_STEP_M, _STEPS = 0.3, 60  # of a trail
 _CROWDED_M = 1.2  # so near to another person the clothes of the person are not learned
 
 
@@ -33,7 +35,7 @@ class PersonDetection(hfg.Node):
 
     alike = hfg.Parameter(0.07, Interval(gt=0, le=2), unit="1")
     nearest = hfg.Parameter(6.0, Interval(gt=0, le=20), unit="m")
-    patience = hfg.Parameter(1.5, Interval(gt=0, le=60), unit="s")
+    patience = hfg.Parameter(0.6, Interval(gt=0, le=60), unit="s")
     scene = hfg.Input(Scene)
     person = hfg.Event(Person)
     gone = hfg.Event(Person)
@@ -73,7 +75,7 @@ class PersonDetection(hfg.Node):
 
     @hfg.slot(while_active=True)
     def people(self, people: list[Any]) -> None:
-        """Choose the nearest one of the people ahead whom the camera and the laser both see."""
+        """Choose the one whom the detector is surest of, among those whom the camera and the laser both see."""
         boxes, (photo, scene) = people
         if self.wanted is not None:
             return
@@ -83,10 +85,11 @@ class PersonDetection(hfg.Node):
             far = math.dist(scene.pose[:2], (one.x, one.y))
             if top is None or far > self.nearest:
                 continue
-            if any(is_in(box, photo.camera, scene, one.x, one.y, top) for box in boxes):
-                ahead.append((far, one))
+            for order, box in enumerate(boxes):
+                if is_in(box, photo.camera, scene, one.x, one.y, top):
+                    ahead.append((order, far, one))
         if ahead:
-            _, one = min(ahead)
+            _, _, one = min(ahead)
             look = self.wears.get(one.number)
             self.person.trigger(Person(one.number, one.x, one.y, one.vx, one.vy, scene.stamp, look))
 
@@ -100,6 +103,13 @@ class PersonDetection(hfg.Node):
         """Look for this one."""
         if person is not self.wanted:
             self.wanted, self.since = person, None
+
+
+def _longer(trail: tuple[tuple[float, float], ...], x: float, y: float) -> tuple[tuple[float, float], ...]:
+    """Return a trail with one more place, if that is a step away from the last one."""
+    if trail and math.dist(trail[-1], (x, y)) < _STEP_M:
+        return trail
+    return (*trail[-_STEPS:], (x, y))
 
 
 class ObjectTracking(hfg.Node):
@@ -120,8 +130,8 @@ class ObjectTracking(hfg.Node):
 
     alike = hfg.Parameter(0.07, Interval(gt=0, le=2), unit="1")
     unlike = hfg.Parameter(0.12, Interval(gt=0, le=2), unit="1")
-    coasts = hfg.Parameter(1.2, Interval(ge=0, le=60), unit="s")
-    gives_up = hfg.Parameter(2.5, Interval(gt=0, le=60), unit="s")
+    coasts = hfg.Parameter(2.0, Interval(ge=0, le=60), unit="s")
+    gives_up = hfg.Parameter(2.0, Interval(gt=0, le=60), unit="s")
     scene = hfg.Input(Scene)
     person = hfg.Event(Person)
     lost = hfg.Event(Person)
@@ -146,11 +156,11 @@ class ObjectTracking(hfg.Node):
         if own is None:
             if gap <= self.coasts:
                 x, y = known.at(scene.stamp)
-                seen = Person(known.track, x, y, known.vx, known.vy, known.stamp, known.look, False)
-                self.person.trigger(seen)
+                self.person.trigger(replace(known, x=x, y=y, stamp=scene.stamp, is_seen=False))
             return
         look = self._learned(own, known, scene)
-        self.followed = Person(own.number, own.x, own.y, own.vx, own.vy, scene.stamp, look)
+        trail = _longer(known.trail, own.x, own.y)
+        self.followed = Person(own.number, own.x, own.y, own.vx, own.vy, scene.stamp, look, trail=trail)
         self.person.trigger(self.followed)
 
     def _other(self, scene: Scene, known: Person, gap: float) -> Track | None:
@@ -202,7 +212,8 @@ class ObjectTracking(hfg.Node):
     @hfg.slot
     def found(self, person: Person) -> None:
         """Follow this one."""
-        self.followed = person
+        trail = () if self.followed is None else self.followed.trail
+        self.followed = replace(person, trail=_longer(trail, person.x, person.y))
 
     @hfg.slot
     def begin(self) -> None:

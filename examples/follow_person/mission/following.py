@@ -17,12 +17,13 @@ from scipy.ndimage import distance_transform_edt
 
 import hfg
 from examples.follow_person.messages import Array, Twist
-from examples.follow_person.mission.lattice import search
+from examples.follow_person.mission.lattice import along_trail, is_free, search
 from examples.follow_person.perception.records import Person, Scene
 from hfg.geometry import Grid
 from hfg.nodes import flow
 
 _AHEAD_S = 0.8  # so far ahead, in time, is the point that is driven to
+_NEAR_M = 1.2  # so far before a person a path ends
 _FREE_M = 0.5  # around the person no obstacle counts: it is the person
 
 
@@ -34,22 +35,26 @@ class Path:
       points: x, y in the frame of the poses.
       directions: of each point: 1 ahead, -1 back.
       pace: how fast the end of the path moves away.
+      spare: so far before the end of the path the robot stops if the person does.
     """
 
     points: Array
     directions: Array
     pace: float
+    spare: float = 0.0
 
 
 class PlanPath(hfg.Node):
     """Plan a path to the person, once, with motions that the robot can make.
+
+    Where the person has walked is tried first, because there is a way; then a search.
 
     It looks at its activity, as in the paper: persons come all the time, and a path is planned only for the one with
     whom the activity comes.
 
     Attributes:
       backward: it may lead backwards, too.
-      keeps: how far before the person it ends.
+      keeps: how far before the person the robot stops.
       margin: how far it keeps from obstacles.
       grid: of obstacles, around the robot.
       scene: where the robot is.
@@ -59,7 +64,7 @@ class PlanPath(hfg.Node):
     """
 
     backward = hfg.Parameter(False)
-    keeps = hfg.Parameter(2.6, Interval(ge=0, le=20), unit="m")
+    keeps = hfg.Parameter(3.2, Interval(ge=0, le=20), unit="m")
     margin = hfg.Parameter(0.12, Interval(ge=0, le=2), unit="m")
     grid = hfg.Input(Grid)
     scene = hfg.Input(Scene)
@@ -84,23 +89,29 @@ class PlanPath(hfg.Node):
     def _planned(self, grid: Grid, scene: Scene, person: Person) -> Path | None:
         place = scene.seen_from_robot(*person.at(scene.stamp))
         far = math.hypot(*place)
-        left = far - self.keeps
+        near = _NEAR_M if person.is_seen else 0.5
+        spare = max(0.0, self.keeps - near) if person.is_seen else 0.0
+        left = far - near
         away = (person.vx, person.vy) if person.is_seen else (0.0, 0.0)
         towards = np.array(place) @ np.array(_turned(away, -float(scene.pose[2]))) / max(far, 1e-6)
+        pace = max(0.0, float(towards))
         if left < 0.25:
-            return self._in_frame(scene, np.zeros((1, 2)), np.ones(1), 0.0)
+            return self._in_frame(scene, np.zeros((1, 2)), np.ones(1), 0.0, 0.0)
         half = grid.values.shape[0] * grid.cell / 2 - 0.6
         left = min(left, (half - 0.5) / max(max(abs(place[0]), abs(place[1])) / far, 1e-6))
         goal = place[0] * left / far, place[1] * left / far
         clear = _clear(grid, place)
+        trail = along_trail([scene.seen_from_robot(*one) for one in person.trail], near)
+        if trail is not None and is_free(clear, grid.cell, trail, self.margin):
+            return self._in_frame(scene, trail, np.ones(len(trail)), pace, spare)
         found = search(clear, grid.cell, goal, backward=self.backward, margin=self.margin)
         if found is None:
             return None
-        return self._in_frame(scene, found[:, :2], found[:, 2], max(0.0, float(towards)))
+        return self._in_frame(scene, found[:, :2], found[:, 2], pace, spare)
 
-    def _in_frame(self, scene: Scene, points: Any, directions: Any, pace: float) -> Path:
+    def _in_frame(self, scene: Scene, points: Any, directions: Any, pace: float, spare: float) -> Path:
         cos, sin = math.cos(scene.pose[2]), math.sin(scene.pose[2])
-        return Path(points @ np.array([[cos, sin], [-sin, cos]]) + scene.pose[:2], directions, pace)
+        return Path(points @ np.array([[cos, sin], [-sin, cos]]) + scene.pose[:2], directions, pace, spare)
 
 
 def _turned(vector: tuple[float, float], angle: float) -> tuple[float, float]:
@@ -187,17 +198,26 @@ def steer(path: Path, scene: Scene, speed: float, look_ahead: float, sideways: f
     end = following + int(turns[0]) - 1 if len(turns) else len(points) - 1
     reach = max(look_ahead, _AHEAD_S * abs(scene.speed))
     far = np.flatnonzero(off[following : end + 1] > reach)
-    target = points[following + int(far[0]) if len(far) else end]
+    target = points[following + int(far[0])] if len(far) else _beyond(points, end, reach - float(off[end]))
     left = float(np.hypot(*np.diff(np.vstack([place, points[following:]]), axis=0).T).sum())
     to_end = float(np.hypot(*np.diff(np.vstack([place, points[following : end + 1]]), axis=0).T).sum())
     ahead, aside = scene.seen_from_robot(float(target[0]), float(target[1]))
     curvature = 2 * aside / max(ahead * ahead + aside * aside, 0.04)
     last = end == len(points) - 1
-    fast = min(speed, (path.pace if last else 0.0) + 0.2 + 1.1 * max(to_end - 0.1, 0.0))
+    passed = last and direction * scene.seen_from_robot(float(points[-1, 0]), float(points[-1, 1]))[0] < 0.1
+    left, to_end = (0.0, 0.0) if passed else (left, to_end - (path.spare if last else 0.0))
+    fast = max(0.0, min(speed, (path.pace if last else 0.3) + 1.1 * to_end))
     fast = min(fast, math.sqrt(sideways / max(abs(curvature), 1e-6)))
     if left < 0.2 and path.pace < 0.3:
         return Twist(0.0, 0.0, 0.0), left
     return Twist(direction * fast, 0.0, direction * fast * curvature), left
+
+
+def _beyond(points: Array, end: int, far: float) -> Array:
+    """Return a point that lies farther along the direction in which a path ends, so that its end is passed straight."""
+    along = points[end] - points[end - 1] if end else np.zeros(2)
+    place: Array = points[end] + along * far / max(float(np.hypot(*along)), 1e-6)
+    return place
 
 
 class FollowPerson(hfg.Subgraph):

@@ -15,6 +15,8 @@ _MOST: Final = 1500  # motions that are tried before there is "no path"
 _TOLERANCE: Final = 0.6
 _AXLE: Final = 0.18  # the robot is two disks, so far ahead of its middle and to the back of it
 RADIUS: Final = 0.35
+_ON_TRAIL: Final = 1.5  # so near to the trail the robot can follow it
+_JOINS: Final = 1.2  # so far ahead it gets to it
 
 
 def search(
@@ -67,6 +69,51 @@ def _traced(nodes: Any, goal: tuple[float, float]) -> Any:
         x, y, _, direction, index = nodes[index]
         rows.append((x, y, direction))
     return np.array(rows[::-1])
+
+
+def along_trail(trail: list[tuple[float, float]], keeps: float) -> Any:
+    """Return the points of a path along the trail of a person; None if the robot is not on it.
+
+    Args:
+      trail: in the frame of the robot, in the order of walking.
+      keeps: how far before its end the path ends.
+    """
+    points = np.array(trail, np.float64).reshape(-1, 2)
+    if len(points) < 3:
+        return None
+    left = np.r_[np.cumsum(np.hypot(*np.diff(points[::-1], axis=0).T))[::-1], 0.0]
+    points = points[left >= keeps]
+    if not len(points):
+        return None
+    nearest = int(np.hypot(*points.T).argmin())
+    after = points[nearest:]
+    ahead = (np.hypot(*after.T) > _JOINS) & (after[:, 0] > 2.5 * np.abs(after[:, 1]))
+    if np.hypot(*points[nearest]) > _ON_TRAIL or not ahead.any():
+        return None
+    rest = after[int(ahead.argmax()) :]
+    steps = np.linspace(0, 1, max(2, round(float(np.hypot(*rest[0])) / 0.3)), endpoint=False)
+    return np.vstack([steps[:, None] * rest[0], rest])
+
+
+def is_free(clear: Any, cell: float, points: Any, margin: float) -> bool:
+    """Say whether the robot can drive along points, from where it is.
+
+    Args:
+      clear: how far each cell is from the nearest obstacle, in metres.
+      cell: side of a cell.
+      points: rows of x and y; those that are not on the grid are taken as free.
+      margin: how far it keeps from obstacles, besides its radius.
+    """
+    along = np.gradient(points, axis=0)
+    along /= np.maximum(np.hypot(*along.T), 1e-6)[:, None]
+    side = len(clear)
+    room = np.inf
+    for axle in (_AXLE, -_AXLE):
+        places = points + axle * along
+        index = np.floor(places / cell + side / 2).astype(int)
+        inside = ((index >= 0) & (index < side)).all(1) & (np.hypot(*points.T) > 0.3)
+        room = min(room, clear[index[inside, 0], index[inside, 1]].min(initial=np.inf))
+    return bool(room > RADIUS + margin / 2)
 
 
 class _Free:

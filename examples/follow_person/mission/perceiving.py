@@ -106,7 +106,7 @@ class SeePeople(hfg.Subgraph):
     def build(self, graph: hfg.Graph) -> None:
         """Detect people, and join them with what was seen."""
         picture = graph.add(picture_of(), name="picture")
-        detector = graph.add(vision.PeopleDetector(threshold=0.2, pyramid=1.1), name="detector")
+        detector = graph.add(vision.PeopleDetector(threshold=0.0, pyramid=1.1), name="detector")
         both = graph.add(flow.JoinByStamp(values=2), name="both")
         graph.connect(self.seen.inner, picture.seen, overflow="latest")
         graph.connect(picture.out, detector.image)

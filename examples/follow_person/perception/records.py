@@ -78,6 +78,7 @@ class Person:
       stamp: when.
       look: the clothes; None as long as they were not seen.
       is_seen: now; else the place is predicted.
+      trail: where they have walked, the last metres of it.
     """
 
     track: int
@@ -88,6 +89,7 @@ class Person:
     stamp: float
     look: Look | None = None
     is_seen: bool = True
+    trail: tuple[tuple[float, float], ...] = ()
 
     def at(self, stamp: float, longest_s: float = 1.5) -> tuple[float, float]:
         """Return where they should be at another moment."""

@@ -20,8 +20,8 @@ from hfg.nodes.estimation import Track
 _CELL: Final = 0.1
 _SIDE: Final = 400  # cells; the grid goes round, so what is farther away than half of it must be forgotten
 _KEPT: Final = 0.98  # of what a cell has counted, from scan to scan
-_MOST: Final = 18.0
-_STANDS: Final = 10.0  # so often hit
+_MOST: Final = 26.0
+_STANDS: Final = 16.0  # so often hit
 _GROWS: Final = 3.0  # weight of a hit next to something that stands
 _BINS: Final = 360  # directions in which it is looked how far one can see
 _AROUND: Final = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])

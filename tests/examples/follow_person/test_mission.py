@@ -59,8 +59,7 @@ def test_a_person_out_of_sight_walks_on_for_a_while_and_is_lost_then() -> None:
     node = tracking()
     ((name, found),) = fire(node, scene=scene(1.0)).events
     assert (name, found.x, found.is_seen) == ("person", 5.0, False)
-    assert fire(node, scene=scene(2.0)).events == []
-    ((name, found),) = fire(node, scene=scene(2.6)).events
+    ((name, found),) = fire(node, scene=scene(2.1)).events
     assert (name, found.x) == ("lost", 4.0)
 
 
@@ -94,7 +93,7 @@ def test_after_some_patience_it_is_worth_going_where_the_person_was_last() -> No
     node = PersonDetection(patience=1.5)
     fire(node, slot="find", value=person(), active=True)
     assert fire(node, scene=scene(5.0)).events == []
-    assert fire(node, scene=scene(6.0)).events == []
+    assert fire(node, scene=scene(6.5)).events == []
     ((name, gone),) = fire(node, scene=scene(6.6)).events
     assert (name, gone.x) == ("gone", 4.0)
 
@@ -108,16 +107,17 @@ def plan(node: PlanPath, where: Person, pose: tuple[float, float, float] = (0, 0
 
 
 def test_a_path_ends_before_the_person() -> None:
-    ((name, path),) = plan(PlanPath(keeps=2.5), person(x=8.0))
+    ((name, path),) = plan(PlanPath(keeps=3.0), person(x=8.0))
     assert name == "path"
-    assert math.dist(path.points[-1], (5.5, 0.0)) < 0.7
+    assert math.dist(path.points[-1], (6.8, 0.0)) < 0.7
+    assert path.spare == pytest.approx(1.8)
     assert path.pace == pytest.approx(1.0)
 
 
 def test_a_path_is_in_the_frame_of_the_pose() -> None:
     ((_, path),) = plan(PlanPath(keeps=2.0), person(x=8.0), pose=(8.0, -6.0, math.pi / 2))
     assert path.points[0] == pytest.approx([8.0, -6.0])
-    assert math.dist(path.points[-1], (8.0, -2.0)) < 0.7
+    assert math.dist(path.points[-1], (8.0, -1.2)) < 0.7
 
 
 def test_a_person_behind_the_robot_in_a_narrow_place_needs_a_planner_that_may_drive_back() -> None:

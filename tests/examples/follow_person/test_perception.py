@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from examples.follow_person.messages import Camera, Imu, Photo, Twist
-from examples.follow_person.mission.lattice import RADIUS, search
+from examples.follow_person.mission.lattice import RADIUS, along_trail, is_free, search
 from examples.follow_person.perception.bodies import level_cloud, make_scene, upright_bodies
 from examples.follow_person.perception.clothes import look_of, pixel
 from examples.follow_person.perception.records import Look, Scene
@@ -34,7 +34,7 @@ def blob(x: float, y: float, seed: int = 0) -> Any:
 
 def test_what_is_hit_again_and_again_stands_and_somebody_who_walks_by_does_not() -> None:
     known = Standing()
-    for number in range(20):
+    for number in range(40):
         walker = blob(3.0 + 0.15 * number, 1.0, number)
         stands = known.split(np.vstack([blob(5.0, 0.0, number), walker]), HERE, NOBODY, 0.6)
     assert stands[:20].mean() > 0.9
@@ -150,3 +150,19 @@ def test_only_a_planner_that_may_drive_back_leaves_a_dead_end() -> None:
     assert path is not None
     assert path[:, 2].min() == -1
     assert math.dist(path[-1, :2], goal) < 0.7
+
+
+def test_a_path_along_the_trail_ends_before_the_person_and_is_free_where_nothing_stands() -> None:
+    trail = [(0.3 * step - 2.0, 0.4) for step in range(30)]
+    path = along_trail(trail, 2.0)
+    assert path[0] == pytest.approx([0.0, 0.0])
+    assert trail[-1][0] - path[-1, 0] == pytest.approx(2.0, abs=0.31)
+    clear = np.full((200, 200), 5.0)
+    assert is_free(clear, 0.1, path, 0.1)
+    clear[128:133, 102:107] = 0.2  # around x = 3, y = 0.4
+    assert not is_free(clear, 0.1, path, 0.1)
+
+
+def test_a_trail_that_is_far_away_or_leads_back_is_not_followed() -> None:
+    assert along_trail([(0.3 * step, 4.0) for step in range(20)], 2.0) is None
+    assert along_trail([(-0.3 * step, 0.0) for step in range(20)], 2.0) is None
