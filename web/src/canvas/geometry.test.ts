@@ -42,7 +42,7 @@ describe("the first view of a level", () => {
   it("shows no node under the buttons or the legend", () => {
     const [corner, middle] = [
       [{ x: 0, y: 0, width: 200, height: 72 }, { x: 0, y: 1000, width: 200, height: 72 }],
-      [{ x: 0, y: 0, width: 2000, height: 72 }, { x: 900, y: 1000, width: 200, height: 72 }],
+      [{ x: 0, y: 0, width: 2000, height: 72 }, { x: 700, y: 1000, width: 200, height: 72 }],
     ] as LayoutRecord["nodes"][];
     const wide = [{ points: [[0, 0], [2000, 0]] }] as unknown as LayoutRecord["lines"];
     const { y, zoom } = clearOf(allInView, { nodes: corner!, lines: wide }, 1076, 643);

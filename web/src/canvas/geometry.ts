@@ -110,7 +110,8 @@ export function allInView(box: Box, canvasWidth: number, canvasHeight: number): 
 
 /** How much of the lower edge of the canvas has buttons on its left and the legend on its right. */
 const STRIP = 52;
-const CORNER = 260;
+const BUTTONS = 260;
+const LEGEND = 540;
 
 /** A view that shows all of a level, and no node of it under the buttons or the legend. */
 export function clearOf(choose: typeof allInView, layout: Pick<LayoutRecord, "nodes" | "lines">, width: number, height: number): View {
@@ -118,7 +119,7 @@ export function clearOf(choose: typeof allInView, layout: Pick<LayoutRecord, "no
   const view = choose(box, width, height);
   const hidden = layout.nodes.some((one) => {
     const [left, right] = [one.x * view.zoom + view.x, (one.x + one.width) * view.zoom + view.x];
-    return (one.y + one.height) * view.zoom + view.y > height - STRIP && (left < CORNER || right > width - CORNER);
+    return (one.y + one.height) * view.zoom + view.y > height - STRIP && (left < BUTTONS || right > width - LEGEND);
   });
   const isWhole = box.height * view.zoom <= height - 48;
   return hidden && isWhole ? choose(box, width, height - STRIP) : view;
