@@ -159,26 +159,26 @@ def _half_active_slots(reach: Reach) -> list[Problem]:
 
 
 def _unlike_their_kind(reach: Reach) -> list[Problem]:
-    """Events that lead no activity on, though those of all other nodes of the same type do."""
+    """Events and outputs that lead no activity on, though those of all other nodes of the same type do."""
     game, problems = reach.game, []
     leads: dict[tuple[NodeType, str], set[int]] = {}
     of_type: dict[NodeType, list[int]] = {}
     for index in game.nodes:
         of_type.setdefault(game.flat.nodes[index].node._type, []).append(index)
     for edge in game.edges:
-        if edge.source.node > ROOT and edge.source.kind == "event":
+        if edge.source.node > ROOT:
             kind = game.flat.nodes[edge.source.node].node._type
-            if edge.source.name in kind.events:
+            if edge.source.name in kind.events or edge.source.name in kind.outputs:
                 leads.setdefault((kind, edge.source.name), set()).add(edge.source.node)
-    for (kind, event), leading in leads.items():
+    for (kind, port), leading in leads.items():
         others = [index for index in of_type[kind] if index not in leading]
         if len(others) == 1:
             problems.append(
                 Problem(
-                    path=f"{game.flat.path(others[0])}.{event}",
+                    path=f"{game.flat.path(others[0])}.{port}",
                     severity="hint",
                     what="no active edge begins here, although one does at all other nodes of this type",
-                    why=f"{kind.name} keeps its activity when it sends {event} (rule A5)",
+                    why=f"{kind.name} keeps its activity when it sends {port} (rule A5)",
                     remedy="lead the activity on by an active edge, or look whether it is to stay",
                     check="unlike-its-kind",
                 )

@@ -71,6 +71,7 @@ MUTANTS: dict[str, Change] = {
     "no edge to the station": missing(f"{FETCH}/select.station", f"{FETCH}/visit.begin"),
     "no way out of a view that gives up": missing(f"{ROBOT}/explore.gave_up", f"{FETCH}.begin"),
     "no way for a view to give up": missing(f"{ROBOT}/explore/view.gave_up", f"{ROBOT}/explore.gave_up.inner"),
+    "no edge from the plan": missing(f"{VISIT}/go_to/plan.path", f"{VISIT}/go_to/follow.path"),
     "no gate of dock": ungated(f"{VISIT}/dock"),
     "no gate of leave": ungated(f"{VISIT}/leave"),
     "no gate of position": ungated(f"{VISIT}/position"),
