@@ -170,7 +170,7 @@ class Dock:
     """
 
     distance: float = 0.32
-    speed: float = 0.3
+    speed: float = 0.36
 
     def step(self, scan: Scan) -> Step:
         """Look ahead."""

@@ -142,7 +142,7 @@ class MoveToObstacle(hfg.Node):
     """
 
     distance = hfg.Parameter(0.32, Gt(0), unit="m")
-    speed = hfg.Parameter(0.3, Gt(0), unit="m/s")
+    speed = hfg.Parameter(0.36, Gt(0), unit="m/s")
     scan = hfg.Input(Scan)
     command = hfg.Output(Twist)
     done = hfg.Event()
