@@ -72,11 +72,16 @@ def _need_alone(place: Place) -> None:
         need_own(place, there)
         if not stat.S_ISREG(there.st_mode):
             raise OSError(errno.EINVAL, "it is not a plain file", str(place.path))
-    journal = place.path.with_name(f"{place.name}-journal")
-    with suppress(FileNotFoundError), journal.open("rb") as file:
+    for ending in ("-journal", "-wal", "-shm"):  # SQLite would follow a link, and wait at a pipe
+        name = f"{place.name}{ending}"
+        found = place.found(name)
+        if found is not None and not stat.S_ISREG(found.st_mode):
+            raise OSError(errno.EINVAL, f"{name} is not a plain file; remove it", str(place.path))
+    with suppress(FileNotFoundError), os.fdopen(place.open(os.O_RDONLY, f"{place.name}-journal"), "rb") as file:
         file.seek(max(0, os.fstat(file.fileno()).st_size - len(_NAMES_ANOTHER)))
         if file.read() == _NAMES_ANOTHER:
-            raise OSError(errno.EINVAL, f"{journal.name} names another file to be removed; remove it", str(journal))
+            what = f"{place.name}-journal names another file to be removed; remove it"
+            raise OSError(errno.EINVAL, what, str(place.path))
 
 
 def _folder_of(place: Place) -> os.stat_result:

@@ -72,6 +72,21 @@ def test_no_journal_beside_a_file_removes_another_file(tmp_path: Path, opened: C
 
 
 @of_each_kind
+@pytest.mark.parametrize("ending", ["-journal", "-wal", "-shm"])
+@pytest.mark.parametrize("is_link", [True, False])
+def test_no_link_or_pipe_beside_a_file_is_followed(
+    tmp_path: Path, opened: Callable[[str], Any], ending: str, is_link: bool
+) -> None:
+    """An archive that was unpacked can hold both."""
+    precious, other = tmp_path / "precious", tmp_path / f"box{ending}"
+    precious.write_text("precious")
+    other.symlink_to(precious) if is_link else os.mkfifo(other)
+    with pytest.raises(RunError, match=f"cannot be used: box{ending} is not a plain file"):
+        opened(str(tmp_path / "box"))
+    assert precious.read_text() == "precious"
+
+
+@of_each_kind
 @pytest.mark.parametrize(
     "said",
     [
