@@ -24,6 +24,7 @@ from hfg.nodes import flow
 
 _AHEAD_S = 0.8  # so far ahead, in time, is the point that is driven to
 _NEAR_M = 1.2  # so far before a person a path ends
+_SOON_M = 1.5  # people who walk farther away have gone when the robot is there; else it brakes
 _FREE_M = 0.5  # around the person no obstacle counts: it is the person
 
 
@@ -100,7 +101,8 @@ class PlanPath(hfg.Node):
         half = grid.values.shape[0] * grid.cell / 2 - 0.6
         left = min(left, (half - 0.5) / max(max(abs(place[0]), abs(place[1])) / far, 1e-6))
         goal = place[0] * left / far, place[1] * left / far
-        clear = _clear(grid, place)
+        walking = [scene.seen_from_robot(one.x, one.y) for one in scene.tracks if one.moves and one.missed == 0]
+        clear = _clear(grid, [place, *(one for one in walking if math.hypot(*one) > _SOON_M)])
         trail = along_trail([scene.seen_from_robot(*one) for one in person.trail], near)
         if trail is not None and is_free(clear, grid.cell, trail, self.margin):
             return self._in_frame(scene, trail, np.ones(len(trail)), pace, spare)
@@ -119,14 +121,15 @@ def _turned(vector: tuple[float, float], angle: float) -> tuple[float, float]:
     return cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1]
 
 
-def _clear(grid: Grid, person: tuple[float, float]) -> Any:
-    """Return how far each cell is from the nearest obstacle; the person is not an obstacle."""
+def _clear(grid: Grid, people: list[tuple[float, float]]) -> Any:
+    """Return how far each cell is from the nearest obstacle; people are not obstacles."""
     blocked = grid.values > 0
     side = len(blocked)
-    middle = (np.array(person) / grid.cell + side / 2).astype(int)
     reach = round(_FREE_M / grid.cell)
-    rows, columns = (slice(max(0, one - reach), max(0, one + reach + 1)) for one in middle)
-    blocked[rows, columns] = False
+    for person in people:
+        middle = (np.array(person) / grid.cell + side / 2).astype(int)
+        rows, columns = (slice(max(0, one - reach), max(0, one + reach + 1)) for one in middle)
+        blocked[rows, columns] = False
     if not blocked.any():
         return np.full(blocked.shape, np.inf)
     return distance_transform_edt(~blocked) * grid.cell
