@@ -79,7 +79,7 @@ class StateDiagram:
         }
 
     def graph(self) -> Graph:
-        """Return a graph that has only the states, nested as they are, to be drawn.
+        """Return a graph that has only the states, nested as they are, to be drawn and not to run.
 
         Raises:
           UsageError: there are no states.
@@ -120,7 +120,7 @@ class _Drawn:
     """Makes the graph that is drawn: first all states side by side, then the boxes around them, then their names."""
 
     def __init__(self, diagram: StateDiagram) -> None:
-        self.graph = Graph(diagram.name)
+        self.graph = Graph(f"states of {diagram.name}")
         self.diagram = diagram
         self.limits = dict(diagram.limits)
         self.names = {one.path: f"n{number}" for number, one in enumerate(diagram.states)}

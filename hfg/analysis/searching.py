@@ -1,7 +1,7 @@
 """Two ways to decide what the game reaches: every state, breadth first; or which two places go together.
 
 The search is exact in the game and finds the shortest way to a state, but the number of states may explode. The
-concurrency relation (Kovalyov 1992) is polynomial, and finds at least every pair that occurs. Depends on `game`.
+concurrency relation (Kovalyov 1992) is polynomial, and finds at least every pair that occurs. Depends on `places`.
 """
 
 from __future__ import annotations

@@ -129,13 +129,14 @@ def test_an_edge_offers_only_the_options_it_can_have() -> None:
         page = Page(studio_of(workshop())).join()
         of_data = await page.value("edge", path="pace.out -> store.value")
         of_signals = await page.value("edge", path="clock.tick -> heard.hear")
-        assert [one["name"] for one in of_data["options"]] == ["buffer", "initial"]
+        assert [one["name"] for one in of_data["options"]] == ["buffer", "initial", "deadline_s"]
         assert [one["name"] for one in of_signals["options"]] == [
             "capacity",
             "overflow",
             "capacity_limit",
             "initial",
             "through",
+            "deadline_s",
         ]
         assert of_data["anew"] == []  # it does not run, so its options can change
 

@@ -8,7 +8,11 @@ from examples.follow_person.mission import build
 from examples.follow_person.running import carry_out
 from examples.follow_person.world import Conditions
 
-pytestmark = [pytest.mark.soak, pytest.mark.timeout(3600)]
+pytestmark = [
+    pytest.mark.soak,
+    pytest.mark.timeout(3600),
+    pytest.mark.xfail(reason="the robot still loses the person among others, see docs/following.md", strict=True),
+]
 
 
 @pytest.mark.parametrize("seed", [1, 2])
