@@ -317,7 +317,8 @@ def _is_always_live(target: Any) -> bool:
 
 
 def _fits(path: str, pattern: str) -> bool:
-    return fnmatchcase(path, pattern) or _is_inside(pattern, path)
+    # "world.odometry[0]" is the path of a port, although brackets have a meaning in patterns
+    return path == pattern or fnmatchcase(path, pattern) or _is_inside(pattern, path)
 
 
 def _is_inside(node: str, path: str) -> bool:

@@ -34,11 +34,24 @@ async def answer(host: Any, viewer: Viewer, message: m.Request) -> Reply:
       HfgError: it is refused; nothing was changed.
     """
     if isinstance(message, m.Ask):
+        _need_allowed(host, message.what)
         return m.Answer(message.id, await ask(host, message.what, message.args))
     if host.read_only and type(message) not in host.steering.looking:
         raise Refused("read_only", host.read_only)
     value = await _DO[type(message)](host, viewer, message)
     return m.Ack(message.id, host.tables.rev) if value is None else m.Answer(message.id, value)
+
+
+_BUILDS: Final = ("paste", "amended")  # nodes, whose code runs
+_LISTS: Final = ("folder", "start")  # what might be opened
+
+
+def _need_allowed(host: Any, what: str) -> None:
+    """Refuse questions whose answers are of use only to those who may change, or open, something."""
+    if what in _BUILDS and host.read_only:
+        raise Refused("read_only", host.read_only)
+    if what in _LISTS:
+        host.may_open()
 
 
 # --- edits ---

@@ -114,6 +114,22 @@ def test_ports_are_selected_by_path_by_node_or_by_pattern(tmp_path: Path, select
     assert recorded(build(), tmp_path / "run.mcap", select=select).ports == ports
 
 
+def test_a_port_of_several_is_selected_by_its_path(tmp_path: Path) -> None:
+    class Eyes(hfg.Node):
+        seen = hfg.Outputs(int)
+
+        def process(self) -> None:
+            for port in self.seen:
+                port.send(1)
+            raise hfg.EndOfStream
+
+    graph = hfg.Graph()
+    eyes = graph.add(Eyes(seen=2), name="eyes")
+    for port in eyes.seen:
+        graph.connect(port, graph.add(show()).ports.inputs["value"])
+    assert recorded(graph, tmp_path / "run.mcap", select="eyes.seen[1]").ports == ["eyes.seen[1]"]
+
+
 def test_ports_inside_of_subgraphs_have_their_paths(tmp_path: Path) -> None:
     class Box(hfg.Subgraph):
         into = hfg.Input(int)

@@ -289,6 +289,13 @@ def test_read_only_pages_may_look_and_not_change() -> None:
         assert page.hello["read_only"] == "You may look, not change."
         for message in ({"t": "edit", "commands": [add("x")]}, {"t": "undo"}, {"t": "start"}, {"t": "save"}):
             assert (await page.ask(**message))["code"] == "read_only"
+        for what, args in (
+            ("paste", {"text": "graph: hfg.nodes.flow:Pass"}),
+            ("amended", {"before": "", "after": ""}),
+            ("folder", {"path": ""}),
+            ("start", {}),
+        ):
+            assert (await page.ask("ask", what=what, args=args))["code"] == "read_only"
         assert await page.value("targets", port="source.out")
 
     live(main)
