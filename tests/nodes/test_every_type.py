@@ -24,6 +24,7 @@ NEEDS: dict[str, str] = {
     "hfg.nodes.links:Publish": "a graph around it, which says the type",
     "hfg.nodes.links:Subscribe": "a graph around it, which says the type",
     "hfg.nodes.mapping:load_map": "a map file",
+    "hfg.nodes.mapping:save_map": "a map that is not tilted",
     "hfg.nodes.scenes:scene_of_clusters": "a cloud with clusters",
     "hfg.nodes.video:Camera": "a camera",
     "hfg.nodes.video:Screenshot": "a screen",

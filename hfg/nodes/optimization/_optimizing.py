@@ -58,6 +58,7 @@ class Optimize(Node):
     Raises:
       ValueError: `values` is not as long as `ranges`, a score comes though no candidate is out, or no candidate has a
         score at the end.
+      UsageError: the package that the method needs is not installed, or a range cannot be read.
     """
 
     ranges = Parameter[tuple[str, ...]](("0..1",))

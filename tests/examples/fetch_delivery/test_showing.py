@@ -40,7 +40,7 @@ ROOT = Path(__file__).parents[3]
 @pytest.fixture(autouse=True)
 def _folded(monkeypatch: pytest.MonkeyPatch) -> None:
     """The drawing of the whole graph takes longer than all the rest, and has tests of its own."""
-    monkeypatch.setattr("hfg.reporting.html._MOST_DRAWN", 10)
+    monkeypatch.setattr("hfg.reporting.drawn._MOST_DRAWN", 10)
 
 
 def shown(folder: Path, seconds: float = 3.0, robots: int = 1, **options: Any) -> tuple[Showing, Result]:
