@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -269,8 +270,11 @@ def test_a_page_that_takes_nothing_is_sent_away_and_keeps_nothing(
     with knock(client) as socket:
         socket.send_text('{"t":"join"}')
         (outbox,) = door.outboxes
-        for _ in range(3000):  # faster than any page
+        full = threading.Event()
+        outbox._loop.call_soon_threadsafe(full.wait)  # until then nothing is written
+        for _ in range(3000):
             outbox.put(Frame(b'"' + b"x" * 10_000 + b'"'))
+        full.set()
         assert until_gone(socket) == 1013
 
 
