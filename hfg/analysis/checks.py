@@ -179,29 +179,16 @@ def _forks(found: Found) -> Iterator[Problem]:
     """
     flat = found.flat
     edges = [edge for edge in found.edges if edge.target.node > ROOT and edge.target.name != "deactivate"]
-    successors: list[list[int]] = [[] for _ in flat.nodes]
-    joins: dict[int, int] = {}
-    for edge in edges:
-        if edge.source.node > ROOT:
-            successors[edge.source.node].append(edge.target.node)
-        if edge.target.kind == "input":
-            joins[edge.target.node] = joins.get(edge.target.node, 0) + 1
-    part_of = [0] * len(flat.nodes)
-    joined: set[int] = set()
-    for number, part in enumerate(strongly_connected(successors)):
-        for index in part:
-            part_of[index] = number if len(part) > 1 else -1
-        if any(joins.get(index, 0) > 1 for index in part):
-            joined.add(number)
+    part_of = _machines(flat, edges)
     sendings: dict[tuple[int, str, str], dict[int, FlatEdge]] = {}
     for edge in edges:
-        key = (edge.source.node, edge.source.kind, edge.source.name)
-        part_number = part_of[edge.target.node]
-        from_inside = edge.source.node == ROOT or (edge.source.node > ROOT and part_of[edge.source.node] == part_number)
-        if part_number >= 0 and part_number not in joined and from_inside:
+        part = part_of[edge.target.node]
+        from_inside = edge.source.node == ROOT or (edge.source.node > ROOT and part_of[edge.source.node] == part)
+        if part is not None and from_inside:
+            key = (edge.source.node, edge.source.kind, edge.source.name)
             sendings.setdefault(key, {}).setdefault(edge.target.node, edge)
     for (source, _, name), targets in sendings.items():
-        parts: dict[int, list[int]] = {}
+        parts: dict[int | None, list[int]] = {}
         for target in targets:
             parts.setdefault(part_of[target], []).append(target)
         for members in parts.values():
@@ -217,6 +204,23 @@ def _forks(found: Found) -> Iterator[Problem]:
                 "take both by two inputs if they are to work side by side",
                 check="activity-fork",
             )
+
+
+def _machines(flat: FlatGraph, edges: list[FlatEdge]) -> list[int | None]:
+    """Return for each node the number of the part that is taken for a machine, None if it is in none."""
+    successors: list[list[int]] = [[] for _ in flat.nodes]
+    joins: dict[int, int] = {}
+    for edge in edges:
+        if edge.source.node > ROOT:
+            successors[edge.source.node].append(edge.target.node)
+        if edge.target.kind == "input":
+            joins[edge.target.node] = joins.get(edge.target.node, 0) + 1
+    part_of: list[int | None] = [None] * len(flat.nodes)
+    for number, part in enumerate(strongly_connected(successors)):
+        if len(part) > 1 and all(joins.get(index, 0) < 2 for index in part):
+            for index in part:
+                part_of[index] = number
+    return part_of
 
 
 def _unheard_limits(found: Found) -> Iterator[Problem]:

@@ -65,6 +65,35 @@ class Side(msgspec.Struct):
     recording: str | None = None
     notes: list[str] = []
 
+    def count(self, report: Report) -> Side:
+        """Take over what a report counts. Return this side."""
+        self.outcome, self.duration_s, self.counts = report.outcome, report.duration_s, {}
+        for path, node in report.nodes.items():
+            self.counts |= {f"{path}: {name}": getattr(node, name) for name in _OF_NODES}
+        for label, edge in report.edges.items():
+            self.counts |= {f"{label}: {name}": getattr(edge, name) for name in _OF_EDGES}
+        return self
+
+    def add(self, told: Told, judged: Sequence[Score], seed: int | None) -> None:
+        """Add the scores of a run; nan where it has none, so that those of a seed stay side by side."""
+        values = told.scores if told.outcome == "ok" else [float("nan")] * len(judged)
+        for score, value in zip(judged, values, strict=True):
+            self.scores[score.name].append(value)
+        if told.outcome != "ok" and not self.why:
+            self.why = f"{told.outcome}{'' if seed is None else f' with seed {seed}'}: {told.why}"
+
+    def take_first(self, ran: _Ran, file: Path) -> None:
+        """Take over what the first run tells, and what its recording does, if there is one."""
+        if file.exists():
+            recorded = read_recording(file, self.name)
+            self.activity, self.graph, self.recording = recorded.activity, recorded.graph, recorded.recording
+            self.notes += recorded.notes
+        self.notes += [f'tokens of "{port}" are not data, and not compared' for port in ran.left_out]
+        if ran.report is not None:
+            self.count(ran.report)
+        else:
+            self.outcome, self.duration_s = ran.told.outcome, ran.told.simulated_s
+
 
 # --- files ------------------------------------------------------------------------------------------------------------
 
@@ -134,16 +163,7 @@ def read_report(file: Path) -> Side:
         raise UsageError(f'the report "{file}" cannot be read: {error.strerror}') from None
     except (msgspec.DecodeError, RecursionError) as error:
         raise UsageError(f'"{file}" is not the report of a run: {error}; hfg run --json writes one') from None
-    return _counted(Side(str(file)), report)
-
-
-def _counted(side: Side, report: Report) -> Side:
-    side.outcome, side.duration_s, side.counts = report.outcome, report.duration_s, {}
-    for path, node in report.nodes.items():
-        side.counts |= {f"{path}: {name}": getattr(node, name) for name in _OF_NODES}
-    for label, edge in report.edges.items():
-        side.counts |= {f"{label}: {name}": getattr(edge, name) for name in _OF_EDGES}
-    return side
+    return Side(str(file)).count(report)
 
 
 # --- runs -------------------------------------------------------------------------------------------------------------
@@ -203,9 +223,9 @@ def run_both(
             side, first = sides[number // len(every)], number % len(every) == 0
             ran = _read(answer)
             told(ran.told)
-            _add(side, ran, judged, every[number % len(every)])
+            side.add(ran.told, judged, every[number % len(every)])
             if first:
-                _take_first(side, ran, _file(folder, number // len(every)))
+                side.take_first(ran, _file(folder, number // len(every)))
     return sides
 
 
@@ -216,27 +236,6 @@ def _read(answer: bytes | Died) -> _Ran:
     if ran.refused:
         raise UsageError(ran.refused)
     return ran
-
-
-def _add(side: Side, ran: _Ran, judged: Sequence[Score], seed: int | None) -> None:
-    """Add the scores of a run; nan where it has none, so that those of a seed stay side by side."""
-    values = ran.told.scores if ran.told.outcome == "ok" else [float("nan")] * len(judged)
-    for score, value in zip(judged, values, strict=True):
-        side.scores[score.name].append(value)
-    if ran.told.outcome != "ok" and not side.why:
-        side.why = f"{ran.told.outcome}{'' if seed is None else f' with seed {seed}'}: {ran.told.why}"
-
-
-def _take_first(side: Side, ran: _Ran, file: Path) -> None:
-    if file.exists():
-        recorded = read_recording(file, side.name)
-        side.activity, side.graph, side.recording = recorded.activity, recorded.graph, recorded.recording
-        side.notes += recorded.notes
-    side.notes += [f'tokens of "{port}" are not data, and not compared' for port in ran.left_out]
-    if ran.report is not None:
-        _counted(side, ran.report)
-    else:
-        side.outcome, side.duration_s = ran.told.outcome, ran.told.simulated_s
 
 
 def _file(folder: Path, side: int) -> Path:

@@ -254,14 +254,13 @@ def yolo_boxes(
     Raises:
       ValueError: the first result has another shape.
     """
-    rows = results[0] if len(results) else np.zeros(0, np.float32)
+    rows, shape = _first_of(results)
     rows = rows[0] if rows.ndim == 3 and len(rows) == 1 else rows
     first = 4 if layout == "v8" else 5
     if layout == "v8" and rows.ndim == 2:
         rows = rows.T
     if rows.ndim != 2 or rows.shape[1] <= first:
         wanted = "1 x (4 + classes) x candidates" if layout == "v8" else "1 x candidates x (5 + classes)"
-        shape = " x ".join(map(str, results[0].shape)) if len(results) else "no result"
         raise ValueError(f'the output of a YOLO detector of layout "{layout}" is {wanted}, got {shape}')
     with np.errstate(all="ignore"):
         scores = rows[:, first:] * (rows[:, 4:5] if layout == "v5" else 1.0)
@@ -302,15 +301,21 @@ def ssd_boxes(
     Raises:
       ValueError: the first result has another shape.
     """
-    rows = results[0] if len(results) else np.zeros(0, np.float32)
+    rows, shape = _first_of(results)
     if rows.ndim < 2 or rows.shape[-1] != 7:
-        shape = " x ".join(map(str, rows.shape)) if len(results) else "no result"
         raise ValueError(f"the output of an SSD detector is 1 x 1 x candidates x 7, got {shape}")
     rows = rows.reshape(-1, 7).astype(np.float64)
     with np.errstate(all="ignore"):
         corners = rows[:, 3:] * np.array([width, height, width, height])
         classes = np.where(np.isfinite(rows[:, 1]), np.clip(rows[:, 1], 0, 1e6), 0).astype(np.int64)
     return _kept(corners, rows[:, 2], classes, placement, threshold, overlap)
+
+
+def _first_of(results: Sequence[Result]) -> tuple[Any, str]:
+    """Return the result that counts, and its shape in words."""
+    if not len(results):
+        return np.zeros(0, np.float32), "no result"
+    return results[0], " x ".join(map(str, results[0].shape))
 
 
 def _kept(corners: Any, scores: Any, classes: Any, placement: Placement, threshold: float, overlap: float) -> Found:
