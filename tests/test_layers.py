@@ -33,6 +33,7 @@ FLOORS = {
     "hfg.transport": 1,
     "hfg.nodetypes": 2,
     "hfg.registry": 2,
+    "hfg.ros": 2,
     "hfg.graph": 3,
     "hfg.activity": 4,
     "hfg.analysis": 4,

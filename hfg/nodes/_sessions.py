@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import asyncio
 import os
-from typing import Any, Final, TypeAlias
+from collections.abc import Callable, Coroutine
+from typing import Any, Final, Generic, Protocol, TypeAlias, TypeVar
 from weakref import WeakKeyDictionary
 
 from hfg.engine import VirtualTimeLoop
@@ -17,27 +18,34 @@ from hfg.graph import Graph
 from hfg.parts.transports import open_session
 from hfg.transport import Session
 
-_Key: TypeAlias = tuple[str, str]
-
-_OPEN: Final[WeakKeyDictionary[Graph, dict[_Key, _Shared]]] = WeakKeyDictionary()
+_Key: TypeAlias = tuple[object, ...]
 
 
-class _Shared:
-    def __init__(self, opening: asyncio.Task[Session]) -> None:
+class _Closable(Protocol):
+    async def close(self) -> None: ...
+
+
+_S = TypeVar("_S", bound=_Closable)
+
+_OPEN: Final[WeakKeyDictionary[Graph, dict[_Key, _Shared[Any]]]] = WeakKeyDictionary()
+
+
+class _Shared(Generic[_S]):
+    def __init__(self, opening: asyncio.Task[_S]) -> None:
         self.opening = opening
         self.users = 0
 
 
-class Share:
+class Share(Generic[_S]):
     """One node's share of a session; must be closed."""
 
-    def __init__(self, graph: Graph, key: _Key, shared: _Shared) -> None:
+    def __init__(self, graph: Graph, key: _Key, shared: _Shared[_S]) -> None:
         self._graph = graph
         self._key = key
-        self._shared: _Shared | None = shared
+        self._shared: _Shared[_S] | None = shared
         shared.users += 1
 
-    async def session(self) -> Session:
+    async def session(self) -> _S:
         """Return it, once it is open.
 
         Raises:
@@ -54,16 +62,14 @@ class Share:
         shared.users -= 1
         if shared.users:
             return
-        all_of_graph = _OPEN.get(self._graph, {})
-        if all_of_graph.get(self._key) is shared:
-            del all_of_graph[self._key]
+        _OPEN.get(self._graph, {}).pop(self._key, None)
         shared.opening.cancel()
         await asyncio.wait([shared.opening])
         if not shared.opening.cancelled() and shared.opening.exception() is None:
             await shared.opening.result().close()
 
 
-def share(graph: Graph, name: str, settings: str) -> Share:
+def share(graph: Graph, name: str, settings: str) -> Share[Session]:
     """Return a share of the session of a run.
 
     Args:
@@ -76,12 +82,23 @@ def share(graph: Graph, name: str, settings: str) -> Share:
         name = os.environ.get("HFG_TRANSPORT", "") or ("memory" if isinstance(loop, VirtualTimeLoop) else "")
     if not settings and name != "memory":
         settings = os.environ.get("HFG_SETTINGS", "")
+    return share_of(graph, (name, settings), lambda: _open(name, settings))
+
+
+def share_of(graph: Graph, key: _Key, opening: Callable[[], Coroutine[Any, Any, _S]]) -> Share[_S]:
+    """Return a share of what all nodes of a run with one key have in common.
+
+    Args:
+      graph: the whole graph that runs.
+      key: what tells it from others.
+      opening: opens it, if no node has done so.
+    """
     all_of_graph = _OPEN.setdefault(graph, {})
-    shared = all_of_graph.get((name, settings))
+    shared = all_of_graph.get(key)
     if shared is None:
-        opening = loop.create_task(_open(name, settings))
-        shared = all_of_graph[name, settings] = _Shared(opening)
-    return Share(graph, (name, settings), shared)
+        task = asyncio.get_running_loop().create_task(opening())
+        shared = all_of_graph[key] = _Shared(task)
+    return Share(graph, key, shared)
 
 
 async def _open(name: str, settings: str) -> Session:

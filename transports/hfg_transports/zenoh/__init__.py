@@ -14,6 +14,7 @@
     declaring   what a session has declared, and withdraws before it closes
     versions    who else is in the realm, and whether it speaks the same
     ending      closes what a program that ends has left open
+    foreign     sessions with programs that are not hfg's, such as nodes of ROS 2
     transport   the contract of `hfg.transport`, composed of these
 
 Importing it needs no Zenoh; opening a session does: pip install 'hfg[zenoh]'.

@@ -86,3 +86,30 @@ def network_callback(function: Callable[[Any], None], finished: Callable[[], Non
 def connections(session: zenoh.Session) -> list[Connection]:
     """Return the links that a session has now."""
     return [Connection(str(link.zid), link.dst, link.auth_identifier) for link in session.info.links()]
+
+
+def watch_connections(session: zenoh.Session, told: Callable[[bool], None]) -> Any:
+    """Have a function called with whether there is a connection to a session, now and on each change."""
+    put = load().SampleKind.PUT
+
+    def changed(event: zenoh.TransportEvent) -> None:
+        told(event.kind == put)
+
+    return session.info.declare_transport_events_listener(callback(changed), history=True)
+
+
+def keeping_publisher(session: zenoh.Session, key: str, kept: int, **quality: Any) -> Any:
+    """Declare a publisher that gives its last messages to those who subscribe later."""
+    import zenoh.ext
+
+    return zenoh.ext.declare_advanced_publisher(
+        session, key, cache=zenoh.ext.CacheConfig(max_samples=kept), publisher_detection=True, **quality
+    )
+
+
+def catching_subscriber(session: zenoh.Session, key: str, handler: Any, most: int) -> Any:
+    """Declare a subscriber that gets the last messages that publishers have kept."""
+    import zenoh.ext
+
+    history = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=most)
+    return zenoh.ext.declare_advanced_subscriber(session, key, handler, history=history)

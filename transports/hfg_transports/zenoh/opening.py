@@ -9,8 +9,9 @@ from __future__ import annotations
 import json
 import re
 import time
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from hfg.base.logs import log
 from hfg.base.private import check_parents, check_private
@@ -45,7 +46,22 @@ def open_session(settings: Settings | None = None, mode: Mode = "peer", *, wait_
         address is taken, a certificate does not fit, or nobody is there.
     """
     settings = settings or Settings()
-    library = binding.load()
+    if exposed := check_session(settings, mode):
+        log().warning(
+            "insecure: nobody proves who he is at %s, so whoever can connect there can run code as this user",
+            " and ".join(f'"{address}"' for address in exposed),
+        )
+    return open_checked(settings, mode, wait_s=wait_s)
+
+
+def check_session(settings: Settings, mode: Mode) -> list[str]:
+    """Return the addresses of a session without authentication.
+
+    Raises:
+      TransportError: Zenoh is not installed or of another version, the settings are wrong or do not allow such
+        addresses, or a certificate does not fit.
+    """
+    binding.load()
     if mode not in ("router", "peer", "client"):
         raise TransportError(f'there is no mode "{mode}"; take router, peer or client')
     if problems := problems_of(settings):
@@ -61,13 +77,26 @@ def open_session(settings: Settings | None = None, mode: Mode = "peer", *, wait_
         if not settings.insecure:
             raise TransportError(f"{reason.what}; {reason.remedy}")
         exposed.append(address)
-    if exposed:
-        log().warning(
-            "insecure: nobody proves who he is at %s, so whoever can connect there can run code as this user",
-            " and ".join(f'"{address}"' for address in exposed),
-        )
+    return exposed
+
+
+def open_checked(
+    settings: Settings, mode: Mode, *, wait_s: float, more: Mapping[str, Any] | None = None
+) -> zenoh.Session:
+    """Open a session of settings that `check_session` has accepted.
+
+    Args:
+      settings: the network.
+      mode: see `open_session`.
+      wait_s: see `open_session`.
+      more: keys of Zenoh's configuration that are to be different.
+
+    Raises:
+      TransportError: an address is taken, or no agent can be reached.
+    """
+    library = binding.load()
     config = library.Config()
-    for key, value in configuration(settings, mode, wait_s=wait_s).items():
+    for key, value in {**configuration(settings, mode, wait_s=wait_s), **(more or {})}.items():
         config.insert_json5(key, json.dumps(value))
     try:
         session: zenoh.Session = library.open(config)

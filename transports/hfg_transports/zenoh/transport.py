@@ -23,6 +23,7 @@ from hfg_transports.zenoh import binding
 from hfg_transports.zenoh.asking import Answerer, Question
 from hfg_transports.zenoh.declaring import Declarations, Declared
 from hfg_transports.zenoh.ending import close_at_the_end
+from hfg_transports.zenoh.foreign import ForeignRouter
 from hfg_transports.zenoh.inbox import Inbox, Mailbox
 from hfg_transports.zenoh.names import Keys, escape, join
 from hfg_transports.zenoh.opening import WAIT_S, open_session
@@ -44,6 +45,9 @@ _VERSIONS_S: Final = 1.0
 
 class ZenohTransport:
     """Makes sessions over Zenoh."""
+
+    foreign: Final = ForeignRouter
+    """Sessions with programs that are not hfg's."""
 
     async def open(
         self,
