@@ -254,7 +254,7 @@ class Editing(Calling):
                 new.append(line)
             line.edge = edge
             lines.append(line)
-        self.lines = lines + outside
+        self.take_lines(lines + outside)
         return lost + [line for lines in there.values() for line in lines], new
 
     def _path_outside(self, owner: int) -> str:

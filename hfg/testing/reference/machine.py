@@ -428,7 +428,7 @@ class ReferenceMachine(Rings):
         return found
 
     def _works_for_nobody(self, index: int, moot: Set[int]) -> bool:
-        lines = [line for line in self.lines if line.edge.source.owner == index]
+        lines = self.lines_sent(index)
         return bool(lines) and all(self._ends_with(line, moot) for line in lines)
 
     def _ends_with(self, line: Line, moot: Set[int]) -> bool:

@@ -308,8 +308,8 @@ class Sending(State):
     def leave_once(self) -> bool:
         """Outputs of a firing that is over leave in its turn, as soon as those before have been processed (F14)."""
         for station in self.stations:
-            if any(flight.leaving for flight in station.flights):
-                continue  # after it
+            if not station.flights or any(flight.leaving for flight in station.flights):
+                continue  # nothing, or after it
             firings = station.firings_under_way
             over = sorted((one for one in firings if one.over is not None), key=lambda one: one.over_since)
             void = [one for one in over if one.void]  # sends nothing, so it need not wait (F10)
@@ -354,8 +354,8 @@ class Sending(State):
 
     def complete_operators(self, station: Station) -> None:
         """P9: when the event's node has ended, the event completes."""
-        for line in self.lines:
-            if line.edge.source.owner == station.leaf.index and line.operators is not None and not line.completed:
+        for line in self.lines_sent(station.leaf.index):
+            if line.operators is not None and not line.completed:
                 line.completed = True
                 line.operators.complete()
                 self.note_places()  # what came out of one enables before what comes out of the next (F9)

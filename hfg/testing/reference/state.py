@@ -7,13 +7,14 @@ output free, may the node fire) and changes nothing.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.errors import EndOfStream, NodeError
-from hfg.testing.reference.structure import ROOT, Edge, Leaf, Structure, is_box, whole
+from hfg.testing.reference.structure import ROOT, Edge, End, Leaf, Structure, is_box, whole
 from hfg.testing.reference.waiting import MOMENT_S, hand_turned_loop
 from hfg.trace import TraceEvent
 
@@ -171,7 +172,7 @@ class Station:
     @property
     def concurrency(self) -> int:
         """How many of its firings may be in progress at once (F14)."""
-        return int(self.leaf.options.concurrency)
+        return self.leaf.concurrency
 
     @property
     def is_concurrent(self) -> bool:
@@ -241,7 +242,7 @@ class State:
         self.tick = 0
         self.calling_boxes: set[int] = set()  # with a slot call in progress because a node inside is in a thread
         self.stations = [Station(leaf, fresh(leaf)) for leaf in self.structure.leaves]
-        self.lines = [Line(edge, edge.capacity) for edge in self.structure.edges]
+        self.take_lines([Line(edge, edge.capacity) for edge in self.structure.edges])
         self.box_enabled = [bool(box.options.enabled) for box in self.structure.boxes]
         self.box_active = [False] * len(self.structure.boxes)
         self.box_since: list[float | None] = [None] * len(self.structure.boxes)
@@ -263,26 +264,47 @@ class State:
 
     # --- edges
 
+    def take_lines(self, lines: list[Line]) -> None:
+        """Make these the edges of the graph, sorted by their ends. Only an edit changes either."""
+        self.lines = lines
+        self._from: defaultdict[End, list[Line]] = defaultdict(list)
+        self._sent: defaultdict[int, list[Line]] = defaultdict(list)
+        self._out: defaultdict[int, list[Line]] = defaultdict(list)
+        self._waiting: defaultdict[int, list[Line]] = defaultdict(list)
+        self._joined: defaultdict[int, list[Line]] = defaultdict(list)
+        self._called: defaultdict[int, list[Line]] = defaultdict(list)
+        for line in lines:
+            source, target = line.edge.source, line.edge.target
+            self._from[source].append(line)
+            self._sent[source.owner].append(line)
+            if not line.edge.is_event:
+                self._out[source.owner].append(line)
+            elif line.edge.overflow == "wait":
+                self._waiting[source.owner].append(line)
+            if self.is_called(line):
+                self._called[target.owner].append(line)
+            elif target.kind in ("input", "parameter"):
+                self._joined[target.owner].append(line)
+
     def lines_from(self, owner: int, kind: str, name: str) -> list[Line]:
         """Edges of one source, in order of connecting."""
-        return [line for line in self.lines if tuple(line.edge.source) == (owner, kind, name)]
+        return self._from[End(owner, kind, name)]
+
+    def lines_sent(self, owner: int) -> list[Line]:
+        """All edges out of a node or subgraph."""
+        return self._sent[owner]
 
     def lines_out(self, owner: int) -> list[Line]:
         """Synchronous edges out of a node: they belong to its outputs."""
-        return [line for line in self.lines if line.edge.source.owner == owner and not line.edge.is_event]
+        return self._out[owner]
 
     def lines_joined(self, owner: int) -> list[Line]:
         """Edges that a firing of the node takes from; a signal into a parameter takes no part (P8)."""
-        return [
-            line
-            for line in self.lines
-            if line.edge.target.owner == owner
-            and (line.edge.target.kind == "input" or (line.edge.target.kind == "parameter" and not line.edge.is_event))
-        ]
+        return self._joined[owner]
 
     def lines_called(self, owner: int) -> list[Line]:
         """Edges whose tokens are worked on one by one."""
-        return [line for line in self.lines if line.edge.target.owner == owner and self.is_called(line)]
+        return self._called[owner]
 
     def is_deaf(self, line: Line) -> bool:
         """Return whether it leads to a slot that listens only while its node is active, and that does not now (T4)."""
@@ -312,9 +334,10 @@ class State:
     def reaches(self, line: Line) -> bool:
         """The same without its source: what that sent before it was disabled is still delivered (F10)."""
         target = line.edge.target
-        around = (*self._boxes_around(line.edge.source.owner), *self._boxes_around(target.owner))
-        if any(not self._box_open(box) for box in line.edge.via if box not in around):
-            return False  # the edge only passes through it, and the ports there are disabled
+        if line.edge.via:
+            around = (*self._boxes_around(line.edge.source.owner), *self._boxes_around(target.owner))
+            if any(not self._box_open(box) for box in line.edge.via if box not in around):
+                return False  # the edge only passes through it, and the ports there are disabled
         if self.is_outside(target.owner) or (target.kind == "slot" and target.name == "enable"):
             return True
         return self.is_enabled(target.owner)
@@ -342,7 +365,7 @@ class State:
 
     def is_enabled_around(self, index: int) -> bool:
         """Return whether all subgraphs around a node are enabled."""
-        return all(self._box_open(box) for box in self.stations[index].leaf.boxes)
+        return all(self.box_enabled[box] for box in self.stations[index].leaf.boxes)
 
     def _box_open(self, box: int) -> bool:
         around = (*self.structure.boxes[box].boxes, box)
@@ -371,15 +394,7 @@ class State:
 
     def full_lines(self, owner: int) -> list[Line]:
         """Live `wait` edges of the node that hold capacity or more untaken tokens (F8)."""
-        return [
-            line
-            for line in self.lines
-            if line.edge.source.owner == owner
-            and line.edge.is_event
-            and line.edge.overflow == "wait"
-            and self.is_live(line)
-            and len(line.queue) >= line.capacity
-        ]
+        return [line for line in self._waiting[owner] if self.is_live(line) and len(line.queue) >= line.capacity]
 
     # --- activity
 
@@ -482,13 +497,10 @@ class State:
 
     def next_call(self, owner: int) -> Line | None:
         """The edge with the oldest token that waits for a call; of a disabled node only `enable` answers."""
-        if owner in self.calling_boxes:
+        waiting = [line for line in self.lines_called(owner) if line.queue]
+        if not waiting or owner in self.calling_boxes:
             return None
-        candidates = [
-            line
-            for line in self.lines_called(owner)
-            if line.queue and (self.is_enabled(owner) or line.edge.target.name == "enable")
-        ]
+        candidates = [line for line in waiting if (self.is_enabled(owner) or line.edge.target.name == "enable")]
         return min(candidates, key=lambda line: line.queue[0].place, default=None)
 
 

@@ -52,6 +52,10 @@ class Leaf:
     boxes: tuple[int, ...]
     inside: Structure | None = None
     within: int | None = None  # the iterating subgraph around it
+    concurrency: int = field(init=False)  # F14
+
+    def __post_init__(self) -> None:
+        self.concurrency = int(self.options.concurrency)
 
 
 @dataclass
