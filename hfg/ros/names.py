@@ -39,8 +39,8 @@ def full_name(name: str, namespace: str, node: str, remapped: Mapping[str, str] 
     """
     if not _GIVEN.fullmatch(name) or "__" in name:
         raise UsageError(
-            f"{name!r:.300} is not a name in ROS 2: write parts of letters, digits and single underscores that begin with "
-            'no digit, as in "/robot1/scan", "scan" or "~/scan"'
+            f"{name!r:.300} is not a name in ROS 2: write parts of letters, digits and single underscores that do not "
+            'begin with a digit, as in "/robot1/scan", "scan" or "~/scan"'
         )
     above = namespace.rstrip("/")
     if name.startswith("/"):

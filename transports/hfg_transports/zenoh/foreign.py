@@ -104,8 +104,8 @@ class ForeignRouter:
         else:
             if address.startswith("tcp/") and not is_loopback(address):
                 raise TransportError(
-                    f'at "{address}" neither end is authenticated, so any program on the network can send commands: write a '
-                    f'settings file with connect = ["{address}"] and insecure = true if all of them are to be trusted, '
+                    f'at "{address}" no end is authenticated, so any program on the network can send commands: write '
+                    f'a settings file with connect = ["{address}"] and insecure = true if you trust them all, '
                     "or with tls/ and certificates, and pass its path"
                 )
             self.settings = Settings(connect=(address,), insecure=True)
