@@ -687,7 +687,7 @@ class ReferenceMachine(Rings):
             ends = End(ROOT, "event", "outside"), End(self.paths[path], "slot", slot)
             edge = Edge(len(self.lines), label, *ends, True, 16, "wait", None, (), (), ())
             line = self.labels[label] = Line(edge, edge.capacity)
-            self.lines.append(line)
+            self.take_lines([*self.lines, line])
         if self.is_live(line):
             self.enqueue(line, Token(value, activity, self.now), ROOT)
         self.settle()

@@ -265,7 +265,7 @@ class State:
     # --- edges
 
     def take_lines(self, lines: list[Line]) -> None:
-        """Make these the edges of the graph, sorted by their ends. Only an edit changes either."""
+        """Make these the edges of the graph, sorted by their ends."""
         self.lines = lines
         self._from: defaultdict[End, list[Line]] = defaultdict(list)
         self._sent: defaultdict[int, list[Line]] = defaultdict(list)
