@@ -53,9 +53,9 @@ def _lying(game: Game, state: int) -> list[tuple[str, int]]:
 
 
 def test_every_state_of_random_graphs_is_in_the_game_and_plain_graphs_have_no_other() -> None:
-    seen = Counter(compare(draw(seed)) for seed in range(300))
-    assert seen["equal"] > 60, seen
-    assert seen["contained"] > 60, seen
+    seen = Counter(compare(draw(seed)) for seed in range(150))
+    assert seen["equal"] > 30, seen
+    assert seen["contained"] > 30, seen
 
 
 @pytest.mark.soak

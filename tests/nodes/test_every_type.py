@@ -34,6 +34,9 @@ NEEDS: dict[str, str] = {
 }
 """What a test machine has not; such a type may refuse every firing, but only by an error that it declares."""
 
+PARTS = 6
+"""Of the library; the processes that run the tests share them."""
+
 
 @pytest.fixture(scope="module")
 def library() -> Catalogue:
@@ -46,9 +49,11 @@ def test_every_module_of_the_library_can_be_imported(library: Catalogue) -> None
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)  # by the clock, on a machine that has much else to do; each type is held to processor time
-def test_every_type_fires_with_what_it_declares(library: Catalogue) -> None:
-    trials = try_all((one.reference for one in library.types), processes=2)
-    assert len(trials) == len(library.types) > 0
+@pytest.mark.parametrize("part", range(PARTS))
+def test_every_type_fires_with_what_it_declares(library: Catalogue, part: int) -> None:
+    references = [one.reference for one in library.types[part::PARTS]]
+    trials = try_all(references)
+    assert len(trials) == len(references) > 0
     faults = [trial.fault for trial in trials if not (trial.usable or (trial.reference in NEEDS and _refuses(trial)))]
     assert not faults, "\n".join(faults)
 

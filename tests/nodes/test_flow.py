@@ -533,7 +533,7 @@ OFFSETS_S = (0.0, 0.1, 1 / 3, 17.77, 1000.1, 86_400.0 + 1e-3, 1.7e9, 1.7e9 + 0.3
 @pytest.mark.parametrize("offset_s", OFFSETS_S)
 def test_a_window_of_time_always_has_the_same_number_of_samples(rate_hz: float, offset_s: float) -> None:
     """0.3 s at 10 Hz are three values, though 3 * 0.1 is more than 0.3 and 0.7 - 0.4 is less."""
-    stamps = [offset_s + number / rate_hz for number in range(60)]
+    stamps = [offset_s + number / rate_hz for number in range(30)]
     for count in (1, 3, 7):
         seconds = count / rate_hz
         side_by_side, sliding = flow.TimeWindow(seconds=seconds), flow.TimeWindow(seconds=seconds, step_s=1 / rate_hz)

@@ -83,7 +83,7 @@ def difference(plan: GraphPlan, seed: int) -> str | None:
 
 
 @pytest.mark.rule("F7", "G1", "L1", "L2")
-@pytest.mark.parametrize("block", range(20))
+@pytest.mark.parametrize("block", range(10))
 def test_what_runs_over_every_edge_does_not_depend_on_where_a_graph_is_cut(
     block: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -112,7 +112,7 @@ def test_nothing_overtakes_start_on_its_way_to_another_part(block: int, monkeypa
 
 
 @pytest.mark.rule("L1", "R5", "F8", "F13", "A8")
-@pytest.mark.parametrize("block", range(8))
+@pytest.mark.parametrize("block", range(4))
 def test_graphs_with_everything_end_as_they_do_in_one_piece(block: int) -> None:
     """Where events decide, the order is another's; but all comes to its end, and to the same one."""
     for seed in range(3000 + 25 * block, 3000 + 25 * block + 25):

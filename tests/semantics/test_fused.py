@@ -280,7 +280,7 @@ def test_what_the_soak_has_found_is_one_in_all_runs(seed: int, monkeypatch: pyte
 
 @pytest.mark.slow
 @pytest.mark.rule("R2", "R7", "F3", "F4", "F5", "T5", "X1")
-@pytest.mark.parametrize("block", range(8))
+@pytest.mark.parametrize("block", range(5))
 def test_fused_interpreted_and_watched_runs_are_one(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = note_calls(monkeypatch)
     for seed in range(15 * block, 15 * block + 15):
@@ -319,7 +319,7 @@ def test_large_shapes_make_large_regions_and_are_interpreted_in_parts(monkeypatc
 
 @pytest.mark.slow
 @pytest.mark.rule("R1", "F7")
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(15))
 def test_threads_beside_a_region_change_nothing_of_it(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     check(note_calls(monkeypatch), seed, BESIDE_THREADS)
 

@@ -406,7 +406,7 @@ class Recorder(hfg.Node):
 @pytest.mark.slow
 @pytest.mark.rule("F7", "R2")
 @pytest.mark.parametrize("clock", ["virtual", "real"])
-@pytest.mark.parametrize("block", range(6))
+@pytest.mark.parametrize("block", range(3))
 def test_random_graphs_in_threads_send_what_the_oracle_sends(clock: Any, block: int) -> None:
     for seed in range(25 * block, 25 * block + 25):
         plan = random_plan(seed, replace(SYNCHRONOUS, rates=False, waiting=False, boxes=False))
@@ -434,7 +434,7 @@ def test_random_graphs_in_threads_send_what_the_oracle_sends(clock: Any, block: 
 
 @pytest.mark.slow
 @pytest.mark.rule("R6", "F7")
-@pytest.mark.parametrize("block", range(6))
+@pytest.mark.parametrize("block", range(3))
 def test_random_graphs_in_threads_do_the_same_each_time_in_virtual_time(block: int) -> None:
     def done(plan: GraphPlan) -> hfg.Report | str:
         try:
