@@ -1,6 +1,6 @@
 """What rmw_zenoh writes: keys of topics and services, tokens of the graph, attachments, quality of service.
 
-Pure text and bytes, without Zenoh. Source: docs/design.md of https://github.com/ros2/rmw_zenoh, from versions 0.6
+Pure text and bytes, without Zenoh. Source: the design document in https://github.com/ros2/rmw_zenoh, from versions 0.6
 (Kilted) and 0.2.4 (Jazzy) on. Depends on names and errors.
 """
 

@@ -1,4 +1,4 @@
-"""What rmw_zenoh writes: golden strings from docs/design.md of https://github.com/ros2/rmw_zenoh."""
+"""What rmw_zenoh writes: golden strings from its design document, https://github.com/ros2/rmw_zenoh."""
 
 from __future__ import annotations
 
