@@ -311,15 +311,15 @@ class _Guard:
             self._body.cancel()
 
     def has_cancelled(self) -> bool:
-        """Whether it was the guard that has cancelled the block; then its task is not cancelled any more."""
-        if self._cancelled:
-            self._body.uncancel()
+        """Whether it was the guard that has cancelled the block."""
         return self._cancelled
 
     def end(self) -> None:
-        """The block is left."""
+        """The block is left: whatever it raises, its task is not cancelled any more by the guard."""
         if self._watcher is not None:
             self._watcher.cancel()
+        if self._cancelled:
+            self._body.uncancel()
 
 
 async def _quietly(closing: Coroutine[Any, Any, None]) -> None:
