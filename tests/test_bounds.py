@@ -21,6 +21,7 @@ from hfg.nodes.activity import Wait
 from hfg.nodes.files.reading import json_of, read_bytes
 from hfg.recording import File
 from hfg.recording.chunks import Budget, content_of
+from hfg.ros import message
 from hfg.tuning import tune
 from tests.attacks.fuzzing import KINDS
 from tests.limits import patience
@@ -104,6 +105,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "HFG_MOST_NODES_AND_PORTS": _ports,
     "HFG_MOST_PICTURE_PIXELS": lambda folder: need_fair_size(KINDS["picture"].samples()[0], "it"),
     "HFG_MOST_RECORDING_RATIO": lambda folder: Budget(1000).spend(0, 2**33),
+    "HFG_MOST_ROS_VALUES": lambda folder: message("tf2_msgs/msg/TFMessage").unpack(b"\0\1" + bytes(99)),
 }
 
 

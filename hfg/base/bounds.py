@@ -51,6 +51,9 @@ PICTURE_PIXELS: Final = Bound("HFG_MOST_PICTURE_PIXELS", 2**27, "pixels of one i
 RECORDING_RATIO: Final = Bound(
     "HFG_MOST_RECORDING_RATIO", 100, "bytes of a recording, unpacked, for each byte of its file, beyond the first 4 GiB"
 )
+ROS_VALUES: Final = Bound(
+    "HFG_MOST_ROS_VALUES", 10_000_000, "values in a message of ROS 2, apart from the numbers of its arrays"
+)
 
 BOUNDS: Final = (
     ACTIVE_EDGES,
@@ -64,4 +67,5 @@ BOUNDS: Final = (
     NODES_AND_PORTS,
     PICTURE_PIXELS,
     RECORDING_RATIO,
+    ROS_VALUES,
 )

@@ -1,7 +1,8 @@
 """Values of robots in space: transforms, frames over time, scans of lasers, point clouds, grids.
 
     transforms   Transform, and the arrays it consists of
-    records      values with a frame and a stamp: FrameTransform, PoseInFrame, LaserScan, RingScan, PointCloud, Grid
+    records      values with a frame and a stamp: FrameTransform, PoseInFrame, LaserScan, RingScan, PointCloud, Grid;
+                 Twist
     scenes       what a 3-D view shows: Scene, of Solid, Line and Label
     tree         TransformTree: frames over time, and how to get from one to another
 
@@ -10,7 +11,7 @@ the left, z up. Quaternions are Hamilton's, in the order x, y, z, w, as in ROS a
 in Foxglove's schemas. Depends on `types` and numpy.
 """
 
-from hfg.geometry.records import FrameTransform, Grid, LaserScan, PointCloud, PoseInFrame, RingScan
+from hfg.geometry.records import FrameTransform, Grid, LaserScan, PointCloud, PoseInFrame, RingScan, Twist
 from hfg.geometry.scenes import Label, Line, Scene, Solid
 from hfg.geometry.transforms import Coordinates, Quaternion, Transform, Vector3
 from hfg.geometry.tree import FrameError, TransformTree
@@ -31,5 +32,6 @@ __all__ = [
     "Solid",
     "Transform",
     "TransformTree",
+    "Twist",
     "Vector3",
 ]

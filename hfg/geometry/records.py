@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -280,3 +280,17 @@ class Grid:
             raise ValueError(f"the side of a cell is a length above 0, got {self.cell}")
         if self.values.ndim != 2:
             raise ValueError(f"a grid has rows along x and columns along y, got an array of {self.values.shape}")
+
+
+class Twist(NamedTuple):
+    """A velocity in the plane, in the frame of the robot.
+
+    Attributes:
+      vx: ahead, in m/s.
+      vy: to the left, in m/s.
+      omega: counter-clockwise, in rad/s.
+    """
+
+    vx: float
+    vy: float
+    omega: float

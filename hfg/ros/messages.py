@@ -1,38 +1,40 @@
-"""Types of ROS 2: the message, service or action of a name, with its hash, its CDR bytes and its values in hfg.
+"""Types of messages, services and actions in ROS 2: bytes as rmw_zenoh and bags have them, and values as hfg has them.
 
-    message("std_msgs/msg/String").encode("hello")
+`message("sensor_msgs/msg/LaserScan")` decodes to an `hfg.geometry.LaserScan`; `hfg.ros.values` lists which types have
+such a value. A message of any other type is a `Record` with its fields, made from its definition. The common packages
+of ROS 2 are known; `register` reads further `.msg`, `.srv` and `.action` files, and other types are looked for in the
+folders of HFG_ROS_PATH: `<package>/msg/<Name>.msg`. Depends on definitions and values.
 
-Messages of the common packages are those that the library rosbags knows; services and actions of std_srvs,
-example_interfaces and action_msgs are listed here. All others are read from files below the folders in HFG_ROS_PATH:
-`<package>/msg/<Name>.msg`, and alike for srv and action. A value is what hfg has for it (see `values`), else a record
-with the message's fields. Depends on names, values and rosbags (`hfg[ros2]`).
+Examples:
+  >>> text = message("std_msgs/msg/String")
+  >>> text.dds_name, text.value_type, text.decode(text.encode("hello"))
+  ('std_msgs::msg::dds_::String_', <class 'str'>, 'hello')
 """
 
 from __future__ import annotations
 
+import functools
 import os
-from functools import cache
-from pathlib import Path
+import struct
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from hfg.errors import EncodingError, UsageError, in_words
+from hfg.base.bounds import ROS_VALUES
+from hfg.errors import EncodingError, UsageError
+from hfg.ros import definitions as of
+from hfg.ros import values
+from hfg.ros.definitions import Record
 from hfg.ros.names import dds_name
-from hfg.ros.values import KNOWN, Conversion
+from hfg.ros.typestore import Types
 
-_DISTRO: Final = "jazzy"
-_LONGEST_FILE: Final = 1_000_000  # bytes of a definition
-_EVENT: Final = "service_msgs/msg/ServiceEventInfo"
-_UUID: Final = "unique_identifier_msgs/msg/UUID"
+Buffer = bytes | bytearray | memoryview
 
-_DEFINITIONS: Final = {
-    "std_srvs/srv/Empty": "---",
-    "std_srvs/srv/SetBool": "bool data\n---\nbool success\nstring message",
-    "std_srvs/srv/Trigger": "---\nbool success\nstring message",
-    "example_interfaces/srv/AddTwoInts": "int64 a\nint64 b\n---\nint64 sum",
-    "action_msgs/srv/CancelGoal": "action_msgs/GoalInfo goal_info\n---\nint8 return_code\n"
-    "action_msgs/GoalInfo[] goals_canceling",
-    "example_interfaces/action/Fibonacci": "int32 order\n---\nint32[] sequence\n---\nint32[] sequence",
-}
+_LITTLE: Final = b"\0\1\0\0"
+_BIG: Final = b"\0\0\0\0"
+_SPARE: Final = 12  # bytes after a message: some writers add padding, rclpy up to the next number of an empty array
+_HEADER: Final = "std_msgs/msg/Header"
+_PARTS: Final = ("_Request", "_Response", "_Goal", "_Result", "_Feedback", "_FeedbackMessage", "_Event")
+_TIME: Final = "builtin_interfaces/msg/Time"
 
 
 class MessageType:
@@ -40,52 +42,123 @@ class MessageType:
 
     Attributes:
       name: "std_msgs/msg/String".
-      dds_name: as on the wire.
-      value_type: what `decode` returns.
+      dds_name: "std_msgs::msg::dds_::String_".
+      record: the class with the message's own fields.
+      value_type: type of the values that `decode` returns: the record, or another type of hfg.
+      has_stamp: it begins with a header or a time.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, types: Types) -> None:
         self.name = name
         self.dds_name = dds_name(name)
-        self._conversion: Conversion | None = KNOWN.get(name)
-        self._class = _store().types[name]
-        self.value_type: Any = self._class if self._conversion is None else self._conversion.type
+        self._types = types
+        self.record = types.record(name)
+        self._size = of.size_of(name, types.known)
+        self._conversion = values.conversion(name) if types.is_standard(name) else None
+        self.value_type: Any = self.record if self._conversion is None else self._conversion.value_type
+        first = types.known[name][0][1]
+        self.has_stamp = first in ((of.NAME, _HEADER), (of.NAME, _TIME))
 
-    @property
+    @functools.cached_property
     def hash(self) -> str:
-        """The hash of the definition, "RIHS01_..."."""
-        return _hash(self.name)
+        """The hash of the definition, "RIHS01_...": both sides of a topic have the same."""
+        return of.hash_of(self.name, self._types.known)
 
-    def encode(self, value: Any) -> bytes:
-        """Return the message of a value.
+    @functools.cached_property
+    def text(self) -> str:
+        """The definition as bags have it, with those of the types in it."""
+        return of.text_of(self.name, self._types.known)
+
+    def encode(self, value: Any, *, stamp: float = 0.0, frame_id: str = "") -> bytes:
+        """Return a message: CDR, little endian, with its 4 bytes of header.
 
         Args:
-          value: of `value_type`, or a record: an object or a mapping with the message's fields; fields that are left
-            out have their defaults.
+          value: of `value_type`, or a record, or a mapping of its fields; what is left out has its default.
+          stamp: for the message's header if the value has no stamp of its own, in seconds.
+          frame_id: for the message's header if the value has no frame of its own.
 
         Raises:
-          EncodingError: it is not of the type.
+          EncodingError: the value is not of the type, or does not fit into the message.
         """
-        try:
-            if self._conversion is not None and not hasattr(value, "__msgtype__"):
-                value = self._conversion.to_ros(value)
-            if not isinstance(value, self._class):
-                value = _record(self.name, value)
-            return bytes(_store().serialize_cdr(value, self.name))
-        except Exception as error:
-            raise EncodingError(f"a value is not a {self.name}: {in_words(error)}") from error
+        if self._conversion is not None and not isinstance(value, self.record | Mapping):
+            header = values.Header(stamp, frame_id)
+            try:
+                value = self._conversion.to_record(value, header, self._types.record)
+            except EncodingError as error:
+                raise EncodingError(f"{self.name}: {error}") from None
+            except (AttributeError, TypeError, ValueError, OverflowError) as error:
+                raise EncodingError(f"{value!r:.80} cannot be sent as {self.name}: {error}") from None
+        return self.pack(value)
 
-    def decode(self, data: bytes) -> Any:
-        """Return the value of a message.
+    def decode(self, buffer: Buffer) -> Any:
+        """Return the value of a message, of `value_type`. Its arrays may be views of the buffer, and cannot be written.
 
         Raises:
-          EncodingError: it is not of the type.
+          EncodingError: the bytes are not such a message, need too much memory, or have no such value.
         """
+        record = self.unpack(buffer)
+        if self._conversion is None:
+            return record
         try:
-            value = _store().deserialize_cdr(data, self.name)
-            return value if self._conversion is None else self._conversion.from_ros(value)
-        except Exception as error:  # the library raises many kinds
-            raise EncodingError(f"{len(data)} bytes are not a {self.name}: {in_words(error)}") from error
+            return self._conversion.to_value(record)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise EncodingError(f"a message of {self.name} has no value here: {error}") from None
+
+    def pack(self, record: Record | Mapping[str, Any]) -> bytes:
+        """Return the message of a record, or of a mapping of its fields.
+
+        Raises:
+          EncodingError: a field does not fit; the message names it.
+        """
+        fitting = self._types.fit(self.name)(record, self.name.rpartition("/")[2])
+        store = self._types.store
+        try:
+            made: memoryview = store.serialize_cdr(fitting, self.name, little_endian=True)
+        except (OverflowError, struct.error, UnicodeEncodeError) as error:
+            raise EncodingError(f"a record of {self.name} cannot be encoded: {error}") from None
+        return bytes(made)
+
+    def unpack(self, buffer: Buffer) -> Record:
+        """Return the record of a message; see `decode`.
+
+        Raises:
+          EncodingError: the bytes are not such a message, or need too much memory.
+        """
+        data = memoryview(buffer).cast("B").toreadonly()
+        head = bytes(data[:4])
+        if head[:2] not in (_LITTLE[:2], _BIG[:2]) or len(data) < 4:
+            raise EncodingError(f"a message of {self.name} begins with {head.hex(' ')}, which is not plain CDR")
+        self._need_room(len(data) - 4)
+        definition = self._types.store.get_msgdef(self.name)
+        decode = definition.deserialize_cdr_le if head[1] else definition.deserialize_cdr_be
+        try:
+            record: Record
+            record, end = decode(data[4:], 0, definition.cls, self._types.store)
+        except (ValueError, struct.error, of.serde_error()) as error:
+            raise EncodingError(f"{len(data)} bytes are not a message of {self.name}: {error}") from None
+        if not 0 <= len(data) - 4 - end <= _SPARE:
+            raise EncodingError(f"a message of {self.name} ends after {end + 4} bytes, but there are {len(data)}")
+        return record
+
+    def _need_room(self, count: int) -> None:
+        needed = self._size.values + count * self._size.dense
+        if self._size.least > count + 8:
+            raise EncodingError(f"a message of {self.name} has at least {self._size.least} bytes, found {count}")
+        if needed > ROS_VALUES.most:
+            raise EncodingError(
+                f"a message of {self.name} with {count:,} bytes can have {int(needed):,} values; {ROS_VALUES.remedy}"
+            )
+
+    def stamp(self, buffer: Buffer) -> float | None:
+        """Return the time in a message's header in seconds; None if it has none or is too short."""
+        data = memoryview(buffer).cast("B")
+        if not self.has_stamp or len(data) < 12:
+            return None
+        seconds, nanoseconds = struct.unpack_from("<iI" if data[1] else ">iI", data, 4)
+        return float(seconds + nanoseconds / 1e9)
+
+    def __repr__(self) -> str:
+        return f"message({self.name!r})"
 
 
 class ServiceType:
@@ -93,20 +166,21 @@ class ServiceType:
 
     Attributes:
       name: "std_srvs/srv/SetBool".
-      dds_name: as on the wire.
-      request, response: the types of its messages.
+      dds_name: "std_srvs::srv::dds_::SetBool_".
+      request, response: types of its messages.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, types: Types) -> None:
         self.name = name
         self.dds_name = dds_name(name)
-        self.request = MessageType(f"{name}_Request")
-        self.response = MessageType(f"{name}_Response")
+        self._types = types
+        self.request = _message(types, f"{name}_Request")
+        self.response = _message(types, f"{name}_Response")
 
-    @property
+    @functools.cached_property
     def hash(self) -> str:
         """The hash of the definition, "RIHS01_..."."""
-        return _hash(self.name)
+        return of.hash_of(self.name, self._types.known)
 
 
 class ActionType:
@@ -114,217 +188,131 @@ class ActionType:
 
     Attributes:
       name: "example_interfaces/action/Fibonacci".
-      goal, result, feedback: the types of its values.
-      send_goal, get_result: its services.
-      feedback_message: the type of its topic.
+      goal, result, feedback: types of its messages, as users see them.
+      send_goal: the service that accepts goals: `goal_id` and `goal`; `accepted` and `stamp`.
+      get_result: the service that waits for the end: `goal_id`; `status` and `result`.
+      cancel_goal: the service that cancels, the same for all actions.
+      feedback_message: the type of the topic of feedback: `goal_id` and `feedback`.
+      status: the type of the topic of states, the same for all actions.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, types: Types) -> None:
         self.name = name
-        self.goal = MessageType(f"{name}_Goal")
-        self.result = MessageType(f"{name}_Result")
-        self.feedback = MessageType(f"{name}_Feedback")
-        self.send_goal = ServiceType(f"{name}_SendGoal")
-        self.get_result = ServiceType(f"{name}_GetResult")
-        self.feedback_message = MessageType(f"{name}_FeedbackMessage")
+        self._types = types
+        self.goal = _message(types, f"{name}_Goal")
+        self.result = _message(types, f"{name}_Result")
+        self.feedback = _message(types, f"{name}_Feedback")
+        self.feedback_message = _message(types, f"{name}_FeedbackMessage")
+        self.send_goal = ServiceType(f"{name}_SendGoal", types)
+        self.get_result = ServiceType(f"{name}_GetResult", types)
+        self.cancel_goal = ServiceType("action_msgs/srv/CancelGoal", types)
+        self.status = _message(types, "action_msgs/msg/GoalStatusArray")
 
-    def read_result(self, response: bytes) -> tuple[int, Any]:
+    def read_result(self, response: Buffer) -> tuple[int, Any]:
         """Return status and result in a response of `get_result`.
 
         Raises:
           EncodingError: it is not of the type.
         """
-        value = self.get_result.response.decode(response)
+        value: Any = self.get_result.response.unpack(response)
         return int(value.status), value.result
 
+    @functools.cached_property
+    def hash(self) -> str:
+        """The hash of the definition, "RIHS01_..."."""
+        return of.hash_of(self.name, self._types.known)
 
-@cache
+
+@functools.cache
+def shared() -> Types:
+    """Return the types of this process, which `register` adds to."""
+    return Types()
+
+
 def message(name: str) -> MessageType:
     """Return a type of messages.
 
+    Args:
+      name: package, kind and name: "std_msgs/msg/String"; "std_msgs/String" is the same.
+
     Raises:
-      UsageError: there is no such type.
-
-    Examples:
-      >>> message("std_msgs/msg/String").hash[:15]
-      'RIHS01_df668c74'
+      UsageError: there is no such type, or `hfg[ros2]` is not installed.
     """
-    _define(name, "msg")
-    return MessageType(name)
+    return _message(shared(), _full(name, "msg"))
 
 
-@cache
 def service(name: str) -> ServiceType:
-    """Return a type of services.
+    """Return a type of services: "std_srvs/srv/SetBool".
 
     Raises:
-      UsageError: there is no such type.
+      UsageError: there is no such type, or `hfg[ros2]` is not installed.
     """
-    _define(name, "srv")
-    return ServiceType(name)
+    made: ServiceType = _once(shared(), _full(name, "srv"), ServiceType)
+    return made
 
 
-@cache
 def action(name: str) -> ActionType:
-    """Return a type of actions.
+    """Return a type of actions: "example_interfaces/action/Fibonacci".
 
     Raises:
-      UsageError: there is no such type.
+      UsageError: there is no such type, or `hfg[ros2]` is not installed.
     """
-    _define(name, "action")
-    return ActionType(name)
+    made: ActionType = _once(shared(), _full(name, "action"), ActionType)
+    return made
 
 
-# --- definitions ---
+def register(what: str | os.PathLike[str], name: str = "") -> list[str]:
+    """Make further types known in this process.
+
+    Args:
+      what: a `.msg`, `.srv` or `.action` file, or a folder of them. A file `my_robot/msg/Arm.msg` is
+        "my_robot/msg/Arm"; one in another place takes the name of its folder as that of its package. With a name: the
+        text of such a file.
+      name: of the type in the text: "my_robot/msg/Arm".
+
+    Returns:
+      The names of the types.
+
+    Raises:
+      UsageError: a text cannot be read, contains an unknown type, or a type is known already with another definition.
+    """
+    return shared().register(what, name)
 
 
-@cache
-def _store() -> Any:
-    try:
-        from rosbags.typesys import Stores, get_typestore
-    except ModuleNotFoundError:
-        raise UsageError("types of ROS 2 need rosbags: pip install 'hfg[ros2]'") from None
-    distro = os.environ.get("ROS_DISTRO", "") or _DISTRO
-    known = {one.name.removeprefix("ROS2_").lower(): one for one in Stores if one.name.startswith("ROS2_")}
-    if distro not in known:
-        raise UsageError(f'ROS_DISTRO="{distro}" is not known: take one of {", ".join(known)}')
-    store: Any = get_typestore(known[distro])
-    if _EVENT in store.fielddefs:
-        # rosbags hashes `char` as a type of its own; in ROS 2 it is another word for uint8.
-        constants, fields = store.fielddefs[_EVENT]
-        base, bytes_ = _nodetype("BASE"), _nodetype("ARRAY")
-        gid = ("client_gid", (bytes_, ((base, ("uint8", 0)), 16)))
-        store.fielddefs[_EVENT] = (constants, [gid if one[0] == "client_gid" else one for one in fields])
-    return store
+def types_of(name: str, text: str) -> MessageType:
+    """Return the type of messages that a bag describes: ours if it is defined so, otherwise one of its own.
+
+    Args:
+      name: of the type.
+      text: its definition, and those of the types in it.
+
+    Raises:
+      UsageError: the text cannot be read.
+    """
+    ours = shared()
+    full = _full(name, "msg")
+    made = of.parsed(text, full) if text.strip() or full not in ours.known else {}
+    if all(ours.known.get(one) == fields for one, fields in made.items()):
+        return _message(ours, full)
+    return _message(Types(ours.known | made, ours), full)
 
 
-def _nodetype(name: str) -> Any:
-    from rosbags.interfaces import Nodetype
-
-    return Nodetype[name]
-
-
-@cache
-def _hash(name: str) -> str:
-    return str(_store().hash_rihs01(name))
+def _message(types: Types, name: str) -> MessageType:
+    made: MessageType = _once(types, name, MessageType)
+    return made
 
 
-def _define(name: str, kind: str) -> None:
-    """Add a type to the store, with those it depends on."""
-    store = _store()
-    dds_name(name)
-    if name.split("/")[1] != kind:
+def _once(types: Types, name: str, make: Callable[[str, Types], Any]) -> Any:
+    if name not in types.made:
+        types.complete(name)
+        types.made[name] = make(name, types)
+    return types.made[name]
+
+
+def _full(name: str, kind: str) -> str:
+    package, separator, short = name.partition("/")
+    full = f"{package}/{kind}/{short}" if separator and "/" not in short else name
+    dds_name(full)
+    if full.split("/")[1] != kind and not (kind == "msg" and full.endswith(_PARTS)):
         raise UsageError(f'"{name}" is not of the kind "{kind}": write package/{kind}/Name')
-    if name in store.types or (kind == "action" and f"{name}_Goal" in store.types):
-        return
-    text = _DEFINITIONS.get(name) or _read(name)
-    parts = [part.strip() for part in f"\n{text}\n".split("\n---")]
-    expected = {"msg": 1, "srv": 2, "action": 3}[kind]
-    if len(parts) != expected:
-        raise UsageError(f'the definition of "{name}" has {len(parts)} parts, and a {kind} has {expected}')
-    if kind == "msg":
-        _add(name, parts[0])
-    elif kind == "srv":
-        _add_service(name, *parts)
-    else:
-        _add_action(name, *parts)
-
-
-def _read(name: str) -> str:
-    package, kind, short = name.split("/")
-    folders = [Path(one) for one in os.environ.get("HFG_ROS_PATH", "").split(os.pathsep) if one]
-    for folder in folders:
-        file = folder / package / kind / f"{short}.{kind}"
-        if not file.is_file():
-            continue
-        if file.stat().st_size > _LONGEST_FILE:
-            raise UsageError(f'"{file}" has more than {_LONGEST_FILE:,} bytes, and is not read')
-        return file.read_text(encoding="utf-8", errors="replace")
-    where = f"below {' or '.join(map(str, folders))}" if folders else "and HFG_ROS_PATH names no folder to look in"
-    raise UsageError(f'the type "{name}" is not known: there is no {package}/{kind}/{short}.{kind} {where}')
-
-
-def _add(name: str, text: str) -> None:
-    """Add one struct, and the messages that it depends on."""
-    from rosbags.typesys import get_types_from_msg
-
-    stand_in = f"{name.split('/')[0]}/msg/{name.split('/')[2]}"
-    try:
-        found: Any = get_types_from_msg(text, stand_in)[stand_in]
-    except Exception as error:
-        raise UsageError(f'the definition of "{name}" cannot be read: {in_words(error)}') from error
-    for _, (kind, inner) in found[1]:
-        inner_kind, what = inner[0] if kind in (_nodetype("ARRAY"), _nodetype("SEQUENCE")) else (kind, inner)
-        if inner_kind == _nodetype("NAME"):
-            _define(what, "msg")
-    _store().register({name: found})
-
-
-def _add_fields(name: str, *fields: tuple[str, Any]) -> None:
-    _store().register({name: ([], list(fields))})
-
-
-def _named(name: str) -> tuple[Any, str]:
-    return _nodetype("NAME"), name
-
-
-def _add_service(name: str, request: str, response: str) -> None:
-    _add(f"{name}_Request", request)
-    _add(f"{name}_Response", response)
-    _add_whole(name)
-
-
-def _add_whole(name: str) -> None:
-    """Add the struct that is hashed for a service, of its request, response and event."""
-    some = [(_nodetype("SEQUENCE"), (_named(f"{name}_{part}"), 1)) for part in ("Request", "Response")]
-    _add_fields(f"{name}_Event", ("info", _named(_EVENT)), ("request", some[0]), ("response", some[1]))
-    whole = [(f"{part.lower()}_message", _named(f"{name}_{part}")) for part in ("Request", "Response", "Event")]
-    _add_fields(name, *whole)
-
-
-def _add_action(name: str, goal: str, result: str, feedback: str) -> None:
-    for part, text in (("Goal", goal), ("Result", result), ("Feedback", feedback)):
-        _add(f"{name}_{part}", text)
-    who, base = ("goal_id", _named(_UUID)), _nodetype("BASE")
-    stamp = ("stamp", _named("builtin_interfaces/msg/Time"))
-    _add_fields(f"{name}_SendGoal_Request", who, ("goal", _named(f"{name}_Goal")))
-    _add_fields(f"{name}_SendGoal_Response", ("accepted", (base, ("bool", 0))), stamp)
-    _add_whole(f"{name}_SendGoal")
-    _add_fields(f"{name}_GetResult_Request", who)
-    _add_fields(f"{name}_GetResult_Response", ("status", (base, ("int8", 0))), ("result", _named(f"{name}_Result")))
-    _add_whole(f"{name}_GetResult")
-    _add_fields(f"{name}_FeedbackMessage", who, ("feedback", _named(f"{name}_Feedback")))
-
-
-# --- records ---
-
-
-def _record(name: str, value: Any) -> Any:
-    """Make the library's object of a mapping or object with the fields; what is left out has its default."""
-    import numpy as np
-
-    store = _store()
-    fields = store.fielddefs[name][1]
-    given = value if isinstance(value, dict) else {key: getattr(value, key) for key, _ in fields if hasattr(value, key)}
-    if unknown := sorted(set(given) - {key for key, _ in fields}):
-        raise ValueError(f'it has no field "{unknown[0]}"; there are {", ".join(key for key, _ in fields)}')
-    if not isinstance(value, dict) and not given and fields:
-        raise TypeError(f"got {type(value).__name__}; pass a mapping with {', '.join(key for key, _ in fields)}")
-    made = {}
-    for key, (kind, inner) in fields:
-        is_many = kind in (_nodetype("ARRAY"), _nodetype("SEQUENCE"))
-        (inner_kind, what), count = inner if is_many else ((kind, inner), 0)
-        if inner_kind == _nodetype("NAME"):
-            some = given.get(key, [{}] * (count if kind == _nodetype("ARRAY") else 0) if is_many else {})
-            made[key] = [_record(what, one) for one in some] if is_many else _record(what, some)
-        elif is_many and what[0] != "string":
-            default = np.zeros(count if kind == _nodetype("ARRAY") else 0, what[0])
-            made[key] = np.asarray(given.get(key, default), dtype="u1" if what[0] in ("byte", "char") else what[0])
-        elif is_many:
-            made[key] = list(given.get(key, ()))
-        else:
-            made[key] = given.get(key, _ZERO.get(what[0], 0))
-    return store.types[name](**made)
-
-
-_ZERO: Final[dict[str, Any]] = {"string": "", "wstring": "", "bool": False, "float32": 0.0, "float64": 0.0}
+    return full

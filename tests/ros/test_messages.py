@@ -51,7 +51,7 @@ def test_images_return_as_they_were(shape: tuple[int, ...], dtype: str) -> None:
 
 def test_padded_red_green_blue_images_of_others_become_blue_green_red() -> None:
     kind = message("sensor_msgs/msg/Image")
-    record = kind._class(
+    record = kind.record(
         header=message("std_msgs/msg/Header").decode(message("std_msgs/msg/Header").encode({"frame_id": "cam"})),
         height=2, width=1, encoding="rgb8", is_bigendian=0, step=4, data=np.arange(8, dtype=np.uint8),
     )  # fmt: skip
@@ -66,18 +66,18 @@ def test_a_scan_returns_as_it_was() -> None:
 
 def test_records_are_made_of_mappings_and_filled_with_defaults() -> None:
     twist = message("geometry_msgs/msg/Twist")
-    record = twist.decode(twist.encode({"linear": {"x": 1.5}}))
+    record: Any = twist.unpack(twist.encode({"linear": {"x": 1.5}}))
     assert (record.linear.x, record.linear.y, record.angular.z) == (1.5, 0.0, 0.0)
-    assert twist.decode(twist.encode(record)) == record
+    assert twist.unpack(twist.encode(record)) == record
 
 
 @pytest.mark.parametrize(
     ("name", "value", "sentence"),
     [
-        ("std_msgs/msg/String", 3, "expected text, got int"),
-        ("geometry_msgs/msg/Twist", {"linaer": {}}, 'no field "linaer"'),
-        ("geometry_msgs/msg/Twist", "fast", "pass a mapping with linear, angular"),
-        ("sensor_msgs/msg/Image", np.zeros((2, 2), "i8"), "is not an image of ROS"),
+        ("std_msgs/msg/String", 3, "must be a string, found 3"),
+        ("geometry_msgs/msg/Twist", {"linaer": {}}, "no field 'linaer'"),
+        ("geometry_msgs/msg/Twist", "fast", "cannot be sent as geometry_msgs/msg/Twist"),
+        ("sensor_msgs/msg/Image", np.zeros((2, 2), "i8"), "no images of int64"),
     ],
 )
 def test_other_values_are_refused_with_a_reason(name: str, value: object, sentence: str) -> None:
@@ -93,7 +93,7 @@ def test_bytes_of_others_are_a_value_or_an_encoding_error(data: bytes, name: str
         try:
             message(name).decode(one)
         except EncodingError as error:
-            assert "are not a" in str(error)  # noqa: PT017 - most bytes are none
+            assert name in str(error)  # noqa: PT017 - most bytes are none
 
 
 def test_definitions_come_from_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

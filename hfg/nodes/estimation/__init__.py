@@ -8,13 +8,13 @@ _odometry   twists of differential, omnidirectional and Ackermann drives, Integr
 
 from __future__ import annotations
 
+from hfg.geometry import Twist
 from hfg.nodes.estimation._extended import ExtendedKalmanFilter
 from hfg.nodes.estimation._kalman import AlphaBeta, KalmanFilter, correct, predict
 from hfg.nodes.estimation._odometry import (
     FuseGyro,
     IntegrateTwist,
     OmniTwist,
-    Twist,
     ackermann_twist,
     differential_twist,
     moved_by,

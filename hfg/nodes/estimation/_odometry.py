@@ -3,31 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Interval, MinLen, Unit
 
 from hfg.base.clock import now
-from hfg.geometry import PoseInFrame, Transform
+from hfg.geometry import PoseInFrame, Transform, Twist
 from hfg.nodes.estimation._kalman import Square, Vector, correct, predict
 from hfg.nodetypes.functions import node
 from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, State
-
-
-class Twist(NamedTuple):
-    """A velocity in the plane, in the frame of the robot.
-
-    Attributes:
-      vx: ahead, in m/s.
-      vy: to the left, in m/s.
-      omega: counter-clockwise, in rad/s.
-    """
-
-    vx: float
-    vy: float
-    omega: float
 
 
 @node
