@@ -49,7 +49,11 @@ _MOST_FIELDS: Final = 1_000
 _MOST_DEEP: Final = 32
 _MOST_UNROLLED: Final = 256  # `rosbags` writes a line of code for each item of an array of messages or strings
 _MOST_ITEMS: Final = 2**24
-_DEFAULTS: Final = {("geometry_msgs/msg/Quaternion", "w"): 1.0}
+_DEFAULTS: Final = {
+    ("geometry_msgs/msg/Quaternion", "w"): 1.0,
+    ("sensor_msgs/msg/NavSatStatus", "status"): -2,
+}
+"""Defaults other than 0 in the common packages: the definitions in `rosbags` lack defaults."""
 
 
 class Record(msgspec.Struct, frozen=True):

@@ -31,7 +31,7 @@ Buffer = bytes | bytearray | memoryview
 
 _LITTLE: Final = b"\0\1\0\0"
 _BIG: Final = b"\0\0\0\0"
-_SPARE: Final = 12  # bytes after a message: some writers add padding, rclpy up to the next number of an empty array
+_SPARE: Final = 64  # bytes after a message: some writers add padding, rclpy 4 for each empty array of long numbers
 _HEADER: Final = "std_msgs/msg/Header"
 _PARTS: Final = ("_Request", "_Response", "_Goal", "_Result", "_Feedback", "_FeedbackMessage", "_Event")
 _TIME: Final = "builtin_interfaces/msg/Time"
