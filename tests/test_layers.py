@@ -58,6 +58,7 @@ FLOORS = {
     "hfg.monitors.properties": 2,
     "hfg.monitors.parsing": 2,
     "hfg.monitors.margins": 2,
+    "hfg.monitors.violations": 2,
     "hfg.tuning": 6,
     "hfg.comparing": 7,
     "hfg.cli": 7,
@@ -83,6 +84,7 @@ SAME_FLOOR_PAIRS = {
     ("hfg.nodes", "hfg.recording"),  # a family of it is made there
     ("hfg.nodes", "hfg.tuning"),  # methods of search, and statistics
     ("hfg.files", "hfg.catalogue"),  # which packages a graph file may name
+    ("hfg.parts", "hfg.monitors"),  # each part hears for the monitors of the whole
     ("hfg.parts", "hfg.files"),  # a graph goes to another process as the text of a file
 }
 # The wings of a floor, in the same way: a module imports what lies in its own wing or in a lower one.

@@ -6,6 +6,8 @@ properties   patterns over formulas, and what judges them
 parsing      reads them from text
 margins      how far a run is from violating a property
 violations   what has shown that a property does not hold
+listening    one of them in a run: what it hears, and its judge
+gathering    one over several processes: its points are judged in the order of their times
 watching     lets them be judged in a run; needs the engine, so it is imported when it is used
 judging      judges each run of a graph by the monitors that the graph declares
 facts        the facts that are stated in the graph, in debug runs

@@ -13,10 +13,8 @@ from hfg.base.logs import Log
 from hfg.engine import Run
 from hfg.errors import HfgError, UsageError
 from hfg.graph.structure.level import Whole
-from hfg.graph.structure.monitors import node_part
 from hfg.graph.structure.options import MonitorSpec
 from hfg.monitors.facts import watch_facts
-from hfg.monitors.formulas import Sent
 from hfg.monitors.violations import Violation
 from hfg.monitors.watching import Monitors, monitors_of
 from hfg.types import accepts
@@ -25,7 +23,7 @@ _LOGGER = Log("hfg.monitors")
 
 
 def declared(run: Run) -> Monitors:
-    """Return what the monitors have found that the graph of a run declares; in this process.
+    """Return what the monitors have found that the graph of a run declares.
 
     Raises:
       UsageError: its graph declares none.
@@ -40,13 +38,16 @@ def declared(run: Run) -> Monitors:
 
 
 def judge(run: Run, whole: Whole) -> None:
-    """Begin to judge a run by monitors, and in debug runs by facts, and follow edits; see `Whole.begin_run`."""
+    """Begin to judge a run by monitors, and in debug runs by facts, and follow edits; see `Whole.begin_run`.
+
+    The main part of a run judges by the monitors; facts are checked in the part that has their nodes.
+    """
     judging: _Declared | None = None
     checks_facts = run._engine.settings.debug
 
     def follow() -> None:
         nonlocal judging, checks_facts
-        if whole.monitors and judging is None:
+        if whole.monitors and judging is None and not run._is_part:
             judging = _Declared(run, whole)
         if judging is not None:
             judging.follow()
@@ -71,7 +72,7 @@ class _Declared:
 
     def follow(self) -> None:
         """Judge by what is declared now. A changed monitor starts over."""
-        wanted = {name: spec for name, spec in self._whole.monitors.items() if self._is_here(spec)}
+        wanted = self._whole.monitors
         for name, spec in list(self._specs.items()):
             if wanted.get(name) != spec:
                 self.monitors._remove(name)
@@ -81,14 +82,6 @@ class _Declared:
                 act = partial(self._trigger, spec.triggers) if spec.triggers else spec.on_violation
                 self.monitors._add({name: spec.property}, act)
                 self._specs[name] = spec
-
-    def _is_here(self, spec: MonitorSpec) -> bool:
-        """Return whether this process has the nodes that a monitor names; the check has refused those of several."""
-        if not any(group.process for group in self._whole.groups.by_name.values()):
-            return True  # what is not there after all is refused
-        here = {worker.path for worker in self._run._engine.core.workers}
-        paths = [node_part(one.port if isinstance(one, Sent) else one.node) for one in spec.property.atoms()]
-        return all(any(one == path or one.startswith(f"{path}/") for one in here) for path in paths if path)
 
     def _trigger(self, path: str, violation: Violation) -> None:
         """Trigger a slot or event. The run stays open until the signal is there."""

@@ -24,7 +24,8 @@ class Verdict(enum.Enum):
       HOLDS: it has held so far; at the end of a run: it has held.
       VIOLATED: it did not hold.
       OPEN: something that it asks for has not come, and its time is not over.
-      UNKNOWN: a condition has raised, so nothing is judged any more.
+      UNKNOWN: a condition has raised, so nothing is judged any more; or a process has died, so what happened there is
+        not known.
     """
 
     HOLDS = "holds"

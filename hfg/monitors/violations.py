@@ -1,10 +1,33 @@
-"""A violation of a property, with the points that led to it. Depends on nothing."""
+"""A violation of a property, with the points that led to it; and a point as a part of a run tells it to another.
+
+Depends on nothing.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["Seen", "Violation"]
+import msgspec
+
+__all__ = ["Point", "Seen", "Violation"]
+
+
+class Point(msgspec.Struct, frozen=True, array_like=True, gc=False):
+    """A point that a part of a run tells to the main part.
+
+    Attributes:
+      time: when, on the run's clock.
+      number: of those at the same time, their order.
+      what: the port or node; "": none, only what is active changes.
+      value: what passed there, if it is plain and short; else what it is.
+      true: the numbers of the atoms that are true.
+    """
+
+    time: float
+    number: int
+    what: str
+    value: bool | int | float | str | None
+    true: list[int]
 
 
 @dataclass(frozen=True, slots=True)

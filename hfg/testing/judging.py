@@ -97,10 +97,7 @@ def violated_in(run: hfg.Run) -> list[str]:
     """Return what the monitors of a run have found, a text for each that is violated or judges nothing any more."""
     found = []
     for monitors in monitors_of(run):
-        found += [
-            f'monitor "{name}" has judged nothing since its condition raised {error!r}'
-            for name, error in monitors.broken.items()
-        ]
+        found += monitors.unknown()
         first = {violation.monitor: violation for violation in reversed(monitors.violations)}
         found += [
             f"{violation}" + (f"\n(and {more:,} more of this monitor)" if (more := monitors.counts[name] - 1) else "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Sequence
 from typing import Any
 
 from hfg.monitors import formulas as f
@@ -40,13 +41,13 @@ def holds(formula: f.Formula, trace: Trace, at: int) -> bool:
             return truths[formula]
 
 
-def random_formula(rng: random.Random, depth: int) -> f.Formula:
-    """Any formula over three atoms."""
+def random_formula(rng: random.Random, depth: int, atoms: Sequence[f.Formula] = POINTS) -> f.Formula:
+    """Any formula over these atoms."""
     if depth == 0 or rng.random() < 0.2:
-        return rng.choice(POINTS)
+        return rng.choice(atoms)
     least = rng.choice([0.0, 0.0, 1.0, 2.0])
     bounds: Any = {"at_least_s": least, "within_s": rng.choice([least, least + 1, least + 3, INF])}
-    one, other = random_formula(rng, depth - 1), random_formula(rng, depth - 1)
+    one, other = random_formula(rng, depth - 1, atoms), random_formula(rng, depth - 1, atoms)
     match rng.randrange(9):
         case 0:
             return ~one

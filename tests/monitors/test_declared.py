@@ -258,20 +258,3 @@ def test_a_deadline_from_a_source_is_a_monitor_of_the_age_of_its_tokens() -> Non
     _, found = watched(graph)
     assert [(one.monitor, one.stretch[-1].value) for one in found.violations] == [("fast", 6), ("small", 7)]
     assert build(describe(graph)).monitors == graph.monitors
-
-
-@pytest.mark.rule("L1")
-@pytest.mark.slow
-def test_in_a_cut_graph_each_monitor_judges_where_its_nodes_are() -> None:
-    graph = chain(rate_hz=100.0)
-    graph.group("far", process=True)
-    graph.move("double", group="far")
-    graph.move("sink", group="far")
-    graph.monitor("near", "never(sent(ticks.out, value == 4))")
-    graph.monitor("there", "never(sent(double.out, value == 8))")
-    report = hfg.run(graph)
-    assert sorted(error[:15] for error in report.errors) == ['monitor "near" ', 'monitor "there"']
-    graph.monitor("both", "precedes(sent(ticks.out), sent(double.out))")
-    assert 'it names "ticks.out" in the main process and "double.out" in the process of group "far"' in str(
-        graph.check()[0]
-    )

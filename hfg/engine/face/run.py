@@ -58,6 +58,8 @@ class Run:
     def __init__(self, graph: Graph, parts: Composition) -> None:
         self.graph = graph
         self._parts = parts
+        self._afar: Any = None  # the other parts of the run; see `hfg.monitors.gathering`
+        self._is_part = False  # a part of a run that another process has started
         self._engine = parts.engine
         self._edits = parts.edits
         self._pausing = parts.pausing

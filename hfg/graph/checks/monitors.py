@@ -1,14 +1,12 @@
-"""Monitors that cannot judge: what they name is not there, or not in one process."""
+"""Monitors that cannot judge: what they name is not there."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from hfg.errors import GraphError, Problem
-from hfg.graph.flat.cutting import MAIN, cut
 from hfg.graph.flat.flat_graph import FlatGraph
 from hfg.graph.structure.level import Level
-from hfg.graph.structure.monitors import node_part
 from hfg.graph.structure.options import MonitorSpec
 from hfg.graph.structure.paths import find
 from hfg.monitors.formulas import Sent
@@ -18,18 +16,14 @@ from hfg.types import why_not
 
 
 def monitors(flat: FlatGraph) -> Iterator[Problem]:
-    """Find monitors that name what is not there, and those whose order of points no process knows."""
+    """Find monitors that name what is not there."""
     whole = flat.level.whole
     if flat.level.owner is not None or not whole.monitors:
         return
-    several = any(group.process for group in flat.groups.values())
-    homes = _homes(flat) if several else {}
     for spec in whole.monitors.values():
         wrong = _unfound(flat.level, spec)
         if wrong is not None:
             yield _problem(spec, wrong, "correct the path, or remove the monitor")
-        elif several:
-            yield from _across(spec, homes)
 
 
 def _unfound(level: Level, spec: MonitorSpec) -> str | None:
@@ -55,33 +49,6 @@ def _untriggered(level: Level, path: str) -> str | None:
     if reason is not None:
         return f'"{path}" cannot be given a text, which says what was violated ({reason})'
     return None
-
-
-def _homes(flat: FlatGraph) -> dict[str, str]:
-    """Return the part of each node by its path."""
-    return {node.path: name for name, part in cut(flat).parts.items() for node in part.nodes}
-
-
-def _across(spec: MonitorSpec, homes: dict[str, str]) -> Iterator[Problem]:
-    """Find that several processes would have to judge a monitor together."""
-    paths = [atom.port if isinstance(atom, Sent) else atom.node for atom in spec.property.atoms()]
-    paths += [spec.triggers] if spec.triggers else []
-    places: dict[str, str] = {}
-    for path in paths:
-        node = node_part(path)
-        for one, home in homes.items():
-            if one == node or one.startswith(f"{node}/"):
-                places.setdefault(home, path)
-    if len(places) > 1:
-        said = " and ".join(
-            f'"{path}" in {"the main process" if home == MAIN else f"""the process of group "{home}" """.strip()}'
-            for home, path in list(places.items())[:2]
-        )
-        yield _problem(
-            spec,
-            f"it names {said}: the order of what happens in two processes is not known",
-            "let all nodes that it names, and the one that it triggers, run in one process",
-        )
 
 
 def _problem(spec: MonitorSpec, what: str, remedy: str) -> Problem:

@@ -15,6 +15,7 @@ import msgspec
 
 from hfg.engine.observing.report import EdgeReport, NodeReport
 from hfg.engine.runtime.borders import Hearing
+from hfg.monitors.violations import Point
 from hfg.parts.model.agreement import Answer, Counted, Question, Rest
 from hfg.parts.model.clocks import RunClock
 from hfg.trace import (
@@ -275,12 +276,14 @@ class Seen(Message, frozen=True):
       events: events of the trace.
       tokens: tokens at a tap or a breakpoint.
       count: how many have passed there so far, including skipped ones.
+      points: what a monitor hears.
     """
 
     number: int
     events: list[Sight] = []
     tokens: list[Parcel] = []
     count: Counted = 0
+    points: list[Point] = []
 
 
 class Close(Message, frozen=True):

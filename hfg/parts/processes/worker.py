@@ -303,6 +303,8 @@ class Worker:
                 raise Untrue("which is not for a part")
 
     def _rests(self, rest: Rest) -> None:
+        assert self._serving is not None
+        self._serving.flush()  # what a monitor finds in it may make the graph move again
         self._say(MAIN, messages.Rests(rest))
 
     def _ended(self, part: Part) -> None:

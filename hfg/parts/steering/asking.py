@@ -32,7 +32,7 @@ from hfg.parts.steering.crossing import Crossing
 
 _LOGGER = Log("hfg.parts")
 _NOBODY: Final = 0  # the number of calls whose result is ignored
-_CHANGES_NOTHING: Final = ("wait_for", "wait_inputs", "wait_outputs", "wait_paused", "counts", "try_edit")
+_CHANGES_NOTHING: Final = ("wait_for", "wait_inputs", "wait_outputs", "wait_paused", "counts", "try_edit", "known")
 """Requests that are repeated to a restarted part: repeating them has no further effect."""
 
 _PARAMETER: Final = "parameter "  # prefix of the keys of parameters
@@ -77,6 +77,10 @@ class Homes:
     def of_path(self, path: str) -> str:
         """Return the part of a node by its path; the main part if there is no such node."""
         return self._of_path.get(path, MAIN)
+
+    def below(self, path: str) -> set[str]:
+        """Return the parts of a node, or of those inside a subgraph."""
+        return {home for one, home in self._of_path.items() if one == path or one.startswith(f"{path}/")}
 
     def of_node(self, node: Any) -> str:
         """Return the part of a node, or of a subgraph that is completely in one part; otherwise the main part."""
@@ -134,11 +138,13 @@ class Subscription:
         parts: Iterable[str],
         seen: Callable[[str, Seen], None],
         ended: Callable[[], None] | None,
+        gone: Callable[[str, str], None] | None,
     ) -> None:
         self.number = number
         self.parts = frozenset(parts)
         self.seen = seen
         self.ended = ended
+        self.gone = gone
         self.waits_for: set[str] = set()
 
 
@@ -238,6 +244,7 @@ class Asking:
         verb: str,
         seen: Callable[[str, Seen], None],
         ended: Callable[[], None] | None = None,
+        gone: Callable[[str, str], None] | None = None,
         **arguments: Any,
     ) -> Subscription:
         """Start a continuing request in some parts.
@@ -247,9 +254,10 @@ class Asking:
           verb: the request; it takes the number as `number`.
           seen: called with the name of the part and its observations.
           ended: called when all these parts are over.
+          gone: called with the name of a part that has died, and how; it continues in the next one.
           **arguments: of the verb.
         """
-        subscription = Subscription(next(self._numbers), parts, seen, ended)
+        subscription = Subscription(next(self._numbers), parts, seen, ended, gone)
         self._subscriptions[subscription.number] = subscription
         for part in sorted(subscription.parts):
             if part not in self._over:
@@ -325,6 +333,9 @@ class Asking:
         self._open.discard(part)
         for then in self._when_gone:
             then()
+        for subscription in list(self._subscriptions.values()):
+            if part in subscription.parts and subscription.gone is not None:
+                subscription.gone(part, str(error))
         for name, call, future in list(self._waiting.values()):
             if name != part or future.done():
                 continue

@@ -35,6 +35,7 @@ from hfg.parts.model.messages import Seen
 from hfg.parts.steering.asking import Asking, Subscription
 from hfg.parts.steering.editing import CutEdits, Drawing
 from hfg.parts.steering.reports import Counts
+from hfg.parts.steering.witnesses import Witnesses
 from hfg.ports import EventPort, ParameterPort, Port
 from hfg.trace import Consumer
 
@@ -62,6 +63,7 @@ class CutRun(Run):
         self._heard: dict[EventPort[Any], Subscription] = {}
         self._listeners: list[Listener] = []
         self._tracing: Subscription | None = None
+        self._afar = Witnesses(asking, self._find)
         composition.pausing.when_hit(self._hit)
         for listener in composition.consumers.listeners:
             self._listen(listener)
@@ -353,16 +355,15 @@ class CutRun(Run):
         self._ask_counts("glance")
         mine = super().glance()
         nodes, growing = {node.path: node for node in mine.nodes}, dict(mine.growing)
-        lost, monitors, now = mine.lost, list(mine.monitors), self.now()
+        lost, now = mine.lost, self.now()
         for counts in self._counts.values():
             if (told := counts.glance) is not None:
                 age_s = max(now - counts.at, 0.0)
                 nodes |= {node.path: msgspec.structs.replace(node, age_s=age_s) for node in told.nodes}
                 growing |= told.growing
                 lost += told.lost
-                monitors += told.monitors
         in_order = list(self._in_order(nodes).values())
-        return msgspec.structs.replace(mine, nodes=in_order, lost=lost, growing=growing, monitors=monitors)
+        return msgspec.structs.replace(mine, nodes=in_order, lost=lost, growing=growing)
 
     def statistics(self) -> Statistics:
         """See `Run.statistics`; for other parts as of their last report (see `refresh`), with its age."""

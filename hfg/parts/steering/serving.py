@@ -20,10 +20,13 @@ from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
 from hfg.engine.model.running_node import RunningNode
 from hfg.engine.observing.report import edge_reports, node_reports
-from hfg.errors import EngineInternalError, HfgError
+from hfg.errors import EngineInternalError, HfgError, UsageError
 from hfg.graph import Graph
 from hfg.graph.editing.commands import read
 from hfg.graph.flat import FlatGraph, flatten
+from hfg.monitors.gathering import EVERY_S, Known
+from hfg.monitors.violations import Point
+from hfg.monitors.watching import Witnessing
 from hfg.parts.model.failing import as_failed
 from hfg.parts.model.messages import Call, Failed, Message, Parcel, Result, Seen, Sight
 from hfg.parts.steering.crossing import Crossing
@@ -61,6 +64,7 @@ class Serving:
         self._graph = graph
         self._emptied = emptied
         self.run = Run(graph, composition)
+        self.run._is_part = True
         self._crossing = Crossing(flat)
         self._composition = composition
         self._say = say
@@ -88,6 +92,8 @@ class Serving:
             "trace": self._trace,
             "tap": self._tap,
             "more": self._more,
+            "witness": self._witness,
+            "known": self._known,
             "leave": self._leave,
             "edit": lambda commands, empties: self._edit(partial(edits.edit_now, read(commands)), empties),
             "undo": lambda empties: self._edit(edits.undo_now, empties),
@@ -202,6 +208,19 @@ class Serving:
         if isinstance(watching, _Tapping):
             watching.go_on()
 
+    def _witness(self, number: int, atoms: dict[int, str]) -> None:
+        points = _Points(number, self._crossing, self._say, self._composition.engine.virtual)
+        points.witnessing = Witnessing(self.run, atoms, points.take)
+        points.begun(points.witnessing.leave)
+        self._watching[number] = points
+
+    def _known(self, number: int) -> Known:
+        points = self._watching.get(number)
+        if not isinstance(points, _Points):
+            raise UsageError("the process could not hear what the monitor names; its log says why")
+        points.flush()
+        return points.witnessing.known()
+
     def _break_at(self, number: int, place: str) -> None:
         point = self.run.break_at(place)
         watching = self._watching[number] = _Watching()
@@ -257,11 +276,14 @@ class _Batches(_Watching):
         self._loop = asyncio.get_running_loop()
         self._is_due = False
 
-    def due(self) -> None:
-        """Something has come by."""
+    def due(self, within_s: float = 0.0) -> None:
+        """Something has come by; it may wait so long for more."""
         if not self._is_due:
             self._is_due = True
-            self._loop.call_soon(self._now)
+            if within_s:
+                self._loop.call_later(within_s, self._now)
+            else:
+                self._loop.call_soon(self._now)
 
     def _now(self) -> None:
         self._is_due = False
@@ -324,3 +346,27 @@ class _Tapping(_Batches):
             tokens = [self.crossing.show(self._place, token) for token in self._kept]
             self._kept.clear()
             self.say(Seen(self.number, tokens=tokens, count=self._seen))
+
+
+class _Points(_Batches):
+    """Points for a monitor of the main part, without loss."""
+
+    witnessing: Witnessing
+
+    def __init__(self, number: int, crossing: Crossing, say: Callable[[Message], None], virtual: bool) -> None:
+        super().__init__(number, crossing, say)
+        self._points: list[Point] = []
+        self._every_s = 0.0 if virtual else EVERY_S
+
+    def take(self, point: Point) -> None:
+        """A point is there."""
+        self._points.append(point)
+        if len(self._points) >= _MOST:
+            self.flush()
+        self.due(self._every_s)
+
+    def flush(self) -> None:
+        """See `_Watching`."""
+        if self._points:
+            points, self._points = self._points, []
+            self.say(Seen(self.number, points=points))
