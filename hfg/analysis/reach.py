@@ -7,6 +7,9 @@ Facts that users state are taken for granted: what would violate one is left out
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from functools import reduce
+from itertools import chain
+from operator import or_
 from typing import Final
 
 from hfg.analysis.game import Game
@@ -45,6 +48,7 @@ class Reach:
         self.plays = [Play(self.game, nodes) for nodes in regions_of(self.game)]
         self.found = [self._searched(play, self._premises(play)) for play in self.plays]
         self._pairs: dict[int, dict[int, int]] = {}
+        self._marked: dict[int, int] = {}
 
     def _nodes_of(self, fact: Fact) -> frozenset[int]:
         """The nodes that a fact counts; none if one of them lies where the analysis does not go."""
@@ -97,10 +101,11 @@ class Reach:
 
     def is_marked(self, number: int, mask: int) -> bool:
         """Return whether one of some places of a region may ever hold activity."""
-        found = self.found[number]
-        if any(state & mask for state in found.reached):
-            return True
-        return not found.is_complete and any(place & mask for place in self._pairs_of(number))
+        if number not in self._marked:
+            found = self.found[number]
+            more = () if found.is_complete else self._pairs_of(number)
+            self._marked[number] = reduce(or_, chain(found.reached, more), 0)
+        return bool(self._marked[number] & mask)
 
     def holds(self, places: int) -> bool:
         """Return whether one of some places of any region may ever hold activity."""
