@@ -3,7 +3,8 @@
 A page asks for `states` without arguments, at any time, even while the graph runs. The value has
 
     states   {states: [{path, passes_on}], arrows: [{source, event, target}], limits: {path: seconds}};
-             `source` is "" for the start of the run, `target` "" where activity leaves the graph
+             `source` is "" for the start of the run, `target` "" where activity leaves the graph;
+             `undrawn` says why there is no layout of so many
     layout   the state diagram laid out, in the form of the table `layouts`; its paths are those of the
              graph, so what is active can be marked; null if no activity moves
     regions  per part of the graph: its nodes, and whether at most one and exactly one is active; `holds`
@@ -30,6 +31,7 @@ from hfg.graph.drawing import View
 __all__ = ["states_of"]
 
 _MOST_STATES: Final = 5_000  # of a region; a page waits for the answer
+_MOST_DRAWN: Final = 300  # that takes about three seconds
 
 
 async def states_of(graph: Graph, revision: Callable[[], int]) -> dict[str, Any]:
@@ -59,7 +61,14 @@ async def states_of(graph: Graph, revision: Callable[[], int]) -> dict[str, Any]
 def _read(graph: Graph) -> dict[str, Any]:
     report = analyse_activity(graph, max_states=_MOST_STATES)
     diagram = report.diagram()
-    layout = None
-    if diagram.states:
+    layout, undrawn = None, ""
+    if len(diagram.states) > _MOST_DRAWN:
+        undrawn = (
+            f"The graph has {len(diagram.states):,} states, and a page draws at most {_MOST_DRAWN}: "
+            "hfg draw GRAPH states.svg --view states draws them all."
+        )
+    elif diagram.states:
         layout = msgspec.to_builtins(drawing.lay_out(diagram.graph(), View("activity")))
-    return {**report.as_data(), "problems": msgspec.to_builtins(report.problems), "layout": layout}
+    found = report.as_data()
+    found["states"]["undrawn"] = undrawn
+    return {**found, "problems": msgspec.to_builtins(report.problems), "layout": layout}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import base64
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 import hfg
 from examples.fetch_delivery.mission import build as delivery
 from hfg.errors import HfgError
+from hfg.nodes.activity import Wait
 from hfg.studio.capturing import value_as_file
 from tests.studio.page import Page, live, studio_of
 from tests.studio.stories.graphs import Drive, mission, workshop
@@ -233,5 +235,22 @@ def test_a_graph_in_which_no_activity_moves_has_no_states_to_lay_out() -> None:
         found = await Page(studio_of(hfg.Graph("empty"))).join().value("states")
         assert found["states"]["states"] == []
         assert found["layout"] is None
+
+    live(main)
+
+
+def test_more_states_than_a_page_can_draw_are_counted_with_the_command_that_draws_them() -> None:
+    async def main() -> None:
+        graph = hfg.Graph("ring")
+        nodes = [graph.add(Wait()) for _ in range(301)]
+        graph.start.activates(nodes[0].begin)
+        for one, other in pairwise(nodes):
+            one.done.activates(other.begin)
+        found = await Page(studio_of(graph)).join().value("states")
+        assert found["layout"] is None
+        assert found["states"]["undrawn"] == (
+            "The graph has 301 states, and a page draws at most 300: hfg draw GRAPH states.svg --view states draws "
+            "them all."
+        )
 
     live(main)

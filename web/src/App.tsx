@@ -6,6 +6,7 @@ import { Menu } from "./panels/Menu";
 import { Outline } from "./panels/Outline";
 import { Popovers } from "./panels/Popovers";
 import { StartPage } from "./panels/StartPage";
+import { States } from "./panels/States";
 import { useFailures } from "./panels/useFailures";
 import { FileBar } from "./shell/FileBar";
 import { Rail } from "./shell/Rail";
@@ -62,6 +63,9 @@ export function App() {
               <Canvas />
             </Guard>
             <Outline />
+            <Guard of="The states">
+              <States />
+            </Guard>
             <Toasts />
           </div>
           <Guard of="The inspector">

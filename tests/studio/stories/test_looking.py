@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Locator, expect
 
 from tests.studio.stories.bench import Story
 from tests.studio.stories.graphs import LONG_S
@@ -66,6 +66,33 @@ def test_one_goes_into_a_subgraph_sees_its_activity_and_comes_back(story: Story)
     story.page.locator("#canvas").focus()
     story.press("Escape", "Escape", "Backspace")
     expect(story.node("numbers")).to_be_visible()
+
+
+def test_the_states_are_drawn_the_active_one_is_orange_and_a_click_selects_its_node(story: Story) -> None:
+    def state(path: str) -> Locator:
+        return story.page.locator(f'[data-state="{path}"]')
+
+    story.bench.set("errand/there", "duration", LONG_S)
+    story.bench.set("errand/back", "duration", LONG_S)
+    story.start()
+    story.page.get_by_role("button", name="States (S)").click()
+    story.bench.until(lambda: story.bench.is_active("errand/there"), "the first state is active")
+    on = re.compile(r"\bon\b")
+    expect(state("errand/there")).to_have_class(on)
+    expect(state("errand")).to_have_class(on)
+    expect(state("errand/back")).not_to_have_class(on)
+    expect(story.page.get_by_role("list", name="What is proved")).to_contain_text(
+        "Exactly one is active: proved of 3 nodes"
+    )
+    story.bench.set("errand/there", "duration", 0.1)
+    expect(state("errand/back")).to_have_class(on)
+    story.bench.until(lambda: story.bench.is_active("errand/back"), "the second state is active")
+    expect(state("errand/there")).not_to_have_class(on)
+    state("rest").click()
+    expect(story.node("rest")).to_have_class(re.compile(r"\bsel\b"))
+    expect(story.page.locator("#side h2", has_text="rest")).to_be_visible()
+    story.press("s")
+    expect(state("rest")).to_have_count(0)
 
 
 def test_a_choice_in_the_timeline_is_a_choice_in_the_graph(story: Story) -> None:

@@ -121,6 +121,7 @@ export const DOINGS: Doing[] = [
   { name: "To the change of activity before", keys: "[", run: () => toActivityChange(-1) },
   { name: "To the change of activity after", keys: "]", run: () => toActivityChange(1) },
   { name: "Outline", keys: "O", run: () => change({ panel: studio().panel === "outline" ? null : "outline" }) },
+  { name: "States", keys: "S", run: () => change({ panel: studio().panel === "states" ? null : "states" }) },
   { name: "Timeline", keys: "T", run: () => change({ time: !studio().time }) },
   { name: "Views of nodes", keys: "V", run: () => change({ stage: !studio().stage }) },
   { name: "Actions of nodes", keys: "X", off: edits(), run: () => change({ popover: "actions" }) },

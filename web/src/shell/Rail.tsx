@@ -12,6 +12,7 @@ export function Rail() {
   return (
     <nav id="rail" aria-label="Panels">
       <RailButton icon="tree" label="Outline (O)" on={panel === "outline"} act={() => change({ panel: panel === "outline" ? null : "outline" })} />
+      <RailButton icon="states" label="States (S)" on={panel === "states"} act={() => change({ panel: panel === "states" ? null : "states" })} />
       <RailButton icon="plus" label="Add a node (Tab)" act={() => addInTheMiddle()} />
       <RailButton icon="history" label="History" on={tab === "history"} act={() => change({ tab: "history", time: true })} />
       <RailButton icon="record" label="Reset the activity" act={() => void tell("reset")} />

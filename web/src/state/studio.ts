@@ -5,7 +5,7 @@ import type { Judged } from "./targets";
 
 export type View = "activity" | "mission" | "all";
 export type Tab = "timeline" | "problems" | "log" | "history";
-export type Panel = "outline" | null;
+export type Panel = "outline" | "states" | null;
 export type Popover = "palette" | "commands" | "keys" | "tour" | "open" | "connect" | "actions" | null;
 
 export interface Toast {

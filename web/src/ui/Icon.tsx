@@ -11,6 +11,7 @@ const PATHS = {
   find: '<circle cx="7" cy="7" r="4.2"/><path d="M10.2 10.2 14 14"/>',
   sun: '<circle cx="8" cy="8" r="3"/><path d="M8 1v2M8 13v2M1 8h2M13 8h2M3 3l1.4 1.4M11.6 11.6 13 13M13 3l-1.4 1.4M4.4 11.6 3 13"/>',
   tree: '<path d="M3 3h5M5 3v9h3M5 7.5h3M10 7.5h3M10 12h3"/>',
+  states: '<circle cx="4" cy="4" r="2.5"/><circle cx="12" cy="12" r="2.5" fill="currentColor"/><path d="M6.500 4H10a2 2 0 0 1 2 2v3.500M10 7.500l2 2 2-2"/>',
   plus: '<path d="M8 3v10M3 8h10"/>',
   minus: '<path d="M3 8h10"/>',
   history: '<circle cx="8" cy="8" r="5.5"/><path d="M8 5v3l2 2"/>',
