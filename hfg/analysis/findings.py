@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator
 
+from hfg.analysis.checks import Found
 from hfg.analysis.playing import Play
 from hfg.analysis.proving import StatedFact, Step, steps_to
 from hfg.analysis.reach import Reach
@@ -37,6 +38,9 @@ def _problems_of(reach: Reach, number: int) -> list[Problem]:
     if found.is_complete:
         never = [index for index in sorted(play.nodes) if not reach.may_be_active(index)]
         never = [index for index in never if reach.game.into.get(index)]
+        if never and len(never) < len(play.nodes):
+            spread = Found(game.flat).spread  # the check `never-active` names where no activity comes from any code
+            never = [index for index in never if spread.may_be_active(index)]
         if never and len(never) < len(play.nodes):
             more = f", nor do {len(never) - 1} more behind it" if len(never) > 1 else ""
             problems.append(

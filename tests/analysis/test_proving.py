@@ -539,3 +539,16 @@ def test_a_time_out_of_a_subgraph_bounds_all_nodes_inside() -> None:
     inside = [path for path in limits if path.startswith("robot_0/explore/go_to/")]
     assert inside
     assert limits["robot_0/explore/go_to/plan"] <= min(limits[path] for path in inside)
+
+
+def test_a_node_that_no_activity_can_reach_is_one_finding_of_the_checks() -> None:
+    graph = hfg.Graph()
+    first, lost, behind = (graph.add(Step(), name=name) for name in ("first", "lost", "behind"))
+    graph.start.activates(first.begin)
+    lost.done.activates(behind.begin)
+    behind.done.activates(first.begin)
+    named = [problem for problem in graph.check() if problem.check == "never-active"]
+    assert [(problem.path, problem.what) for problem in named] == [
+        ("lost", 'nothing in the graph makes it active, nor "behind" behind it')
+    ]
+    assert "activity-never-comes" not in {problem.check for problem in hfg.analyse_activity(graph).problems}
