@@ -34,6 +34,7 @@ SUITES = (
     "bench_shape",
     "bench_start",
     "bench_threads",
+    "bench_tuning",
     "bench_virtual_day",
 )
 OTHERS = ("bench_peers", "bench_goals", "bench_links", "bench_studio")
