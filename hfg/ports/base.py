@@ -8,11 +8,13 @@ graphs only through protocols.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Protocol, TypeVar, cast
 
+from hfg.base.token import Token
 from hfg.errors import NotRunning, UsageError
 
-__all__ = ["Kind", "Owner", "Port", "Relaying", "Source", "Target", "path_of"]
+__all__ = ["Kind", "Owner", "Port", "Relaying", "Source", "Target", "need_sendable", "path_of"]
 
 T_co = TypeVar("T_co", covariant=True)
 T_contra = TypeVar("T_contra", contravariant=True)
@@ -155,3 +157,18 @@ def _graph_of(source: object, target: object) -> Any:
         f'"{first.path}" and "{second.path}" do not belong to a graph yet: add their nodes with '
         "graph.add(...) before connecting them"
     )
+
+
+def need_sendable(value: object, activity: object, stamp: object) -> None:
+    """Refuse an invalid modifier or stamp, given or of a token that is passed on (T1, T5).
+
+    Raises:
+      UsageError: the modifier is not -1, 0 or +1, or the stamp is not finite.
+    """
+    if type(value) is Token:
+        activity = value.activity if activity is None else activity
+        stamp = value.stamp if stamp is None else stamp
+    if stamp is not None and not (isinstance(stamp, int | float) and math.isfinite(stamp)):
+        raise UsageError(f"stamp must be seconds on the run's clock, or None for what rule T5 says, got {stamp!r}")
+    if activity is not None and not (isinstance(activity, int) and -1 <= activity <= 1):
+        raise UsageError(f"activity must be -1, 0 or +1, or None for what rule A3 says, got {activity!r}")

@@ -15,7 +15,7 @@ from typing_extensions import TypeForm
 
 from hfg.base.logs import Log
 from hfg.base.token import Token
-from hfg.ports.base import Kind, Owner, Port, Source
+from hfg.ports.base import Kind, Owner, Port, Source, need_sendable
 from hfg.ports.observable import RunObservable
 from hfg.ports.relays import InnerTarget, inner_target
 
@@ -56,7 +56,10 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
         Raises:
           NotRunning: the node is not part of a run.
           QueueOverflow: an edge with policy "error" is full; nothing was sent (rule P5).
+          UsageError: the modifier or the stamp is invalid.
         """
+        if activity is not None or stamp is not None or type(value) is Token:
+            need_sendable(value, activity, stamp)
         self._emit(value, activity, stamp)
 
     async def trigger_wait(
@@ -66,6 +69,8 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
 
         Use it in async code that triggers in an endless loop (rule F8).
         """
+        if activity is not None or stamp is not None or type(value) is Token:
+            need_sendable(value, activity, stamp)
         await self._emit_wait(value, activity, stamp)
 
     @property

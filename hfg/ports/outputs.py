@@ -15,7 +15,7 @@ from typing_extensions import TypeForm
 
 from hfg.base.token import Token
 from hfg.ports.automatic import sent_name
-from hfg.ports.base import Kind, Owner, Port, Source
+from hfg.ports.base import Kind, Owner, Port, Source, need_sendable
 from hfg.ports.events import EventPort
 from hfg.ports.relays import InnerTarget, inner_target
 
@@ -52,8 +52,11 @@ class OutputPort(Port, Source[T]):
 
         Raises:
           NotRunning: the node is not part of a run.
-          UsageError: the output was already written in this firing, or no firing is in progress.
+          UsageError: the output was already written in this firing, no firing is in progress, or the modifier or the
+            stamp is invalid.
         """
+        if activity is not None or stamp is not None or type(value) is Token:
+            need_sendable(value, activity, stamp)
         self._emit(value, activity, stamp)
 
     def loan(self, shape: int | tuple[int, ...], dtype: npt.DTypeLike = np.float64) -> np.ndarray[Any, Any]:

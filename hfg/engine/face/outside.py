@@ -21,9 +21,10 @@ from hfg.engine.rules.sending import enqueue, put_outputs
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.plan import prepare_slot
 from hfg.errors import NotRunning, UsageError
+from hfg.ports.base import need_sendable
 from hfg.types import accepts, describe, describe_value
 
-__all__ = ["Feed", "collect", "need_sendable", "read", "signal", "until"]
+__all__ = ["Feed", "collect", "read", "signal", "until"]
 
 T = TypeVar("T")
 
@@ -74,7 +75,7 @@ class Feed(Generic[T]):
             raise NotRunning(
                 f'the feed of "{self._worker.port_name}" is closed: use it inside "async with run.feed(...)"'
             )
-        need_sendable(activity, stamp)
+        need_sendable(value, activity, stamp)
         self._check_type(value)
         waiting = _Waiting(self._engine, self._worker)
         try:
@@ -97,7 +98,7 @@ class Feed(Generic[T]):
         Raises:
           TypeError: the value is not of the input's type.
         """
-        need_sendable(activity, stamp)
+        need_sendable(value, activity, stamp)
         self._check_type(value)
         return asyncio.run_coroutine_threadsafe(self.send(value, activity=activity, stamp=stamp), self._engine.loop)
 
@@ -164,14 +165,6 @@ class _Waiting:
             self._is_over = True
             self._engine.quiet.senders.remove(self._feed)
             self._engine.kick()
-
-
-def need_sendable(activity: int | None, stamp: float | None) -> None:
-    """Refuse an invalid activity modifier or stamp."""
-    if stamp is not None and not isinstance(stamp, int | float):
-        raise UsageError(f"stamp must be seconds on the run's clock, or None for what rule T5 says, got {stamp!r}")
-    if activity not in (None, -1, 0, 1):
-        raise UsageError(f"activity must be -1, 0 or +1, or None for what rule A3 says, got {activity!r}")
 
 
 async def until(engine: Engine, when: Callable[[Callable[[], None]], None]) -> None:

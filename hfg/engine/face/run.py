@@ -41,6 +41,7 @@ from hfg.graph.structure.level import level_of
 from hfg.graph.structure.paths import parameter_at
 from hfg.nodetypes.node import Node
 from hfg.ports import EventPort, ParameterPort, Port, SlotPort
+from hfg.ports.base import need_sendable
 from hfg.trace import Consumer
 from hfg.types import accepts, describe
 
@@ -102,7 +103,7 @@ class Run:
                 f"run.trigger is for slots and events of nodes, got {port!r}; give tokens to a graph input "
                 f"with run.feed"
             )
-        outside.need_sendable(activity, stamp)
+        need_sendable(value, activity, stamp)
         plain = value.value if isinstance(value, Token) else value
         if not accepts(plain, port.type) and (plain is not None or port.kind == "slot"):
             raise TypeError(f'{port.kind} "{port.path}" expects {describe(port.type)}, got {shown(plain)}')

@@ -22,6 +22,7 @@ from hfg.engine.rules.modifiers import derive_scopes, tell_activity
 from hfg.engine.rules.putting import bring_activity
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import trigger
+from hfg.ports.base import need_sendable
 from hfg.ports.edges import AnyEdge, EventEdge, SyncEdge
 
 __all__ = ["calls_step", "emitter"]
@@ -202,6 +203,7 @@ def _interpreted_emitter(event: RunningEvent) -> Callable[..., None]:
     host = core.runtime
 
     def emit(value: object = None, *, activity: int | None = None, stamp: float | None = None) -> None:
+        need_sendable(value, activity, stamp)
         if host.on_loop():
             trigger(event, value, activity, stamp)
         else:  # from a thread that the user has started, as drivers do
@@ -220,10 +222,18 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
     # (keyword-only parameters would cost 20 ns; the type checker refuses positional ones)
     def emit(value: object = None, activity: int | None = None, stamp: float | None = None) -> None:
         # another node runs if this does not come from a fast path, but perhaps from a thread while the loop runs
-        if activity is not None or core.running_node is not worker or watched or not edge.live or type(value) is Token:
+        if (
+            core.running_node is not worker
+            or watched
+            or not edge.live
+            or activity is not None
+            or stamp is not None
+            or type(value) is Token
+        ):
             interpreted(value, activity=activity, stamp=stamp)
             return
-        if stamp is None and (stamp := worker.stamp) is None:
+        stamp = worker.stamp
+        if stamp is None:
             stamp = core.now()
         edge.sent = number = edge.sent + 1
         if carries and (worker.active or worker.may_carry):

@@ -11,6 +11,7 @@ from hfg.engine.model.running_node import RunningNode
 from hfg.engine.rules import sharing
 from hfg.engine.rules.sending import unwrapped
 from hfg.errors import UsageError
+from hfg.ports.base import need_sendable
 from hfg.types import accepts, describe, describe_value
 
 __all__ = ["entry_of", "merge", "write", "writer"]
@@ -40,6 +41,8 @@ def merge(
                     f'output "{worker.path}.{worker.out_names[position]}" was written twice in one '
                     f"firing: return or send, once"
                 )
+            if type(value) is Token:
+                need_sendable(value, None, None)
             written[position] = unwrapped(value)
     if worker.core.debug:
         _check_values(worker, written)
