@@ -56,6 +56,17 @@ def _studio(*arguments: Any, **options: Any) -> Any:
     return serve_run(*arguments, **options)
 
 
+def _foxglove(*arguments: Any, **options: Any) -> Any:
+    """Implement `Run.foxglove` in the same way."""
+    from hfg.errors import UsageError
+
+    try:
+        from hfg.viewers.foxglove import serve_run
+    except ImportError as error:
+        raise UsageError(f'viewers need {error.name}: pip install "hfg[studio]"') from None
+    return serve_run(*arguments, **options)
+
+
 def _visit_studio(door: Any, transport: Any) -> Any:
     """Implement `hooks.visit_studio`; its dependencies are imported only if another program steers the run."""
     from hfg.studio.local import visit
@@ -125,6 +136,7 @@ hooks.states = _states
 hooks.refusal = _refusal
 hooks.distribute = _distribute
 hooks.studio = _studio
+hooks.foxglove = _foxglove
 hooks.visit_studio = _visit_studio
 hooks.record = _record
 hooks.report_page = _report_page

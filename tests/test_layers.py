@@ -63,6 +63,7 @@ FLOORS = {
     "hfg.comparing": 7,
     "hfg.cli": 7,
     "hfg.studio": 7,
+    "hfg.viewers": 7,
     "hfg.composing": 7,  # puts what stands high where lower floors ask for it
     "hfg.__main__": 8,  # the two doors: they may see everything, and nobody sees them
     "hfg": 8,
@@ -74,6 +75,8 @@ SAME_FLOOR_PAIRS = {
     ("hfg.cli", "hfg.studio"),
     ("hfg.cli", "hfg.comparing"),
     ("hfg.composing", "hfg.studio"),
+    ("hfg.composing", "hfg.viewers"),
+    ("hfg.viewers", "hfg.studio"),  # its server, which checks who comes
     ("hfg.engine", "hfg.links.running"),
     ("hfg.links.pubsub", "hfg.links.running"),
     ("hfg.parts.transports", "hfg.links.local"),  # the one that is always there

@@ -17,6 +17,7 @@ class _Hooks:
       report_page: `hfg.reporting.report_page`, for `Run.report_page`.
       distribute: `hfg.parts.distribution.distribute`, for runs with groups in other processes.
       studio: `hfg.studio.notebook.serve_run`, for `Run.studio`.
+      foxglove: `hfg.viewers.foxglove.serve_run`, for `Run.foxglove`.
       visit_studio: `hfg.studio.local.visit`, for other programs of the same user that steer a run.
       refusal: why a graph file may not name these references of node types and operators, references in values, or
         types, given which packages are allowed in addition; None if it may.
@@ -29,6 +30,7 @@ class _Hooks:
     report_page: Callable[..., Any]
     distribute: Callable[..., Any]
     studio: Callable[..., Any]
+    foxglove: Callable[..., Any]
     visit_studio: Callable[..., Any]
     refusal: Callable[[Iterable[str], Iterable[str], Iterable[str], Iterable[str]], str | None]
     states: Callable[[Any], Any]

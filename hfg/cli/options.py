@@ -106,11 +106,30 @@ class RunFlags:
     ] = False
 
 
+@dataclass(frozen=True, kw_only=True)
+class ViewFlags:
+    """Viewers of a run."""
+
+    foxglove: Annotated[
+        bool, typer.Option("--foxglove", help="Let Foxglove show the run; the address is printed. It changes nothing.")
+    ] = False
+    foxglove_at: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS:PORT", help="Do so at this address; default: the first free port from 8765."),
+    ] = None
+    foxglove_origin: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ORIGIN", help="Another web page that may look, by its origin. Can be repeated."),
+    ] = None
+
+
 def with_flags(verb: Callable[..., int]) -> Callable[..., int]:
     """Replace each group of options that a verb takes by a flag for each of them."""
     signature, hints = inspect.signature(verb), get_type_hints(verb, include_extras=True)
     groups = {
-        name: (hint, list(_flags(hint))) for name, hint in hints.items() if hint in (LoadFlags, RunFlags, RunFields)
+        name: (hint, list(_flags(hint)))
+        for name, hint in hints.items()
+        if hint in (LoadFlags, RunFlags, ViewFlags, RunFields)
     }
     own = [one.replace(annotation=hints[name], kind=one.KEYWORD_ONLY) for name, one in signature.parameters.items()]
     spread = [flag for one in own for flag in (groups[one.name][1] if one.name in groups else [one])]

@@ -9,8 +9,9 @@ import typer
 
 from hfg.cli import show
 from hfg.cli.execute import GraphRun
-from hfg.cli.options import ForceOption, RunFlags, TableOption, VerboseOption
+from hfg.cli.options import ForceOption, RunFlags, TableOption, VerboseOption, ViewFlags
 from hfg.cli.record import told
+from hfg.cli.viewing import Viewing
 from hfg.engine import Run
 from hfg.errors import GraphError, TargetError, UsageError
 from hfg.graph import Graph
@@ -22,6 +23,7 @@ def play(
     file: Annotated[Path, typer.Argument(help="a recording, as hfg record writes it")],
     into: Annotated[str, typer.Option("--into", metavar="TARGET", help="The graph: module:graph or file.py.")],
     flags: RunFlags,
+    views: ViewFlags,
     mapped: Annotated[
         list[str] | None,
         typer.Option(
@@ -40,6 +42,7 @@ def play(
     """Play a recording into a graph, in place of the recorded sources."""
     ports = dict(_pair(one) for one in mapped or []) or None
     played: list[Playing] = []
+    viewing = Viewing(views)
 
     def prepare(graph: Graph) -> None:
         played.append(_played(graph, file, ports, _factor(speed), pickle=pickle))
@@ -53,9 +56,11 @@ def play(
         def begin(run: Run) -> None:
             if output is not None:
                 recordings.append(begin_recording(run, output, force=force, pickle=pickle))
+            viewing.begin(run)
             live.begin(run)
 
         running.run(begin)
+        viewing.end()
     code = told(recordings[0]) if recordings else 0
     return running.ended(verbose=verbose) or code or int(played[0].is_damaged)
 

@@ -15,7 +15,16 @@ import typer
 from hfg.base.whole import GrowingFile, need_writable
 from hfg.cli import show
 from hfg.cli.execute import GraphRun
-from hfg.cli.options import MonitorOption, RunFlags, SettingsOption, TableOption, TargetArgument, VerboseOption
+from hfg.cli.options import (
+    MonitorOption,
+    RunFlags,
+    SettingsOption,
+    TableOption,
+    TargetArgument,
+    VerboseOption,
+    ViewFlags,
+)
+from hfg.cli.viewing import Viewing
 from hfg.engine import Run
 from hfg.engine.observing.encoding import encode
 from hfg.engine.observing.report import RunPage
@@ -32,6 +41,7 @@ _TRACES: Final = ("", ".jsonl", ".json")
 def run(
     target: TargetArgument,
     flags: RunFlags,
+    views: ViewFlags,
     options: RunFields,  # those that declare a flag
     monitor: MonitorOption = None,
     settings: SettingsOption = None,
@@ -67,6 +77,7 @@ def run(
 ) -> int:
     """Run a graph. Ctrl-C stops it; a second Ctrl-C stops it immediately."""
     running = GraphRun.load(target, flags, verbose=verbose)
+    viewing = Viewing(views)
     _declare(running.graph, monitor or ())
     if profile is not None:
         _need_writable(profile)
@@ -88,9 +99,11 @@ def run(
                 running.interrupt.before_leaving.append(pages[0].write)
             if profile is not None:
                 run.statistics()  # starts the measuring of times
+            viewing.begin(run)
             live.begin(run)
 
         running.run(begin, trace=write, settings=settings, **options.said())
+        viewing.end()
     for page in pages:
         if page.error is not None:
             show.sentence(f'the report "{page.path}" cannot be written: {page.error.strerror}')

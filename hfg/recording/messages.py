@@ -233,9 +233,20 @@ class TokenWriter:
         return {**fields, "value": kept}, 2 * size
 
     def _keep_image(self, value: Any) -> tuple[np.ndarray[Any, Any], int]:
-        if not isinstance(value, np.ndarray) or schemas.encoding_of(value) is None:
-            raise CannotKeep(f"{describe_value(value)} is not an image")
+        _need_image(value)
         return np.array(value, order="C", copy=True), value.nbytes
+
+    def shown(self, token: Token[Any], time: float | None) -> Any:
+        """Return the data to encode of a token whose value is not a copy; like `message`.
+
+        Raises:
+          CannotKeep: the value is not data.
+        """
+        if self.is_image:
+            _need_image(token.value)
+        elif self.keep is not None:
+            token = msgspec.structs.replace(token, value=self.keep(token.value)[0])
+        return self.message(token, time)
 
     def message(self, token: Token[Any], time: float | None, firing: int = 0) -> Any:
         """Return the data to encode; `time`: when the token was sent, if that is to be written."""
@@ -270,7 +281,7 @@ class TokenWriter:
         if self.images == "raw":
             step = value.nbytes // height if height else 0
             encoding = schemas.encoding_of(value) or ""
-            return _Raw(stamp, "", width, height, encoding, step, value.tobytes(), value.dtype.str, **rest)
+            return _Raw(stamp, "", width, height, encoding, step, _bytes_of(value), value.dtype.str, **rest)
         return _Compressed(stamp, "", _compress(value, self.images), self.images, **rest)
 
 
@@ -295,6 +306,16 @@ class TokenReader:
         else:
             value = self._codec.decode(message["value"])
         return Token(value, message.get("activity", 0), message["stamp"], message.get("sequence", 0))
+
+
+def _need_image(value: Any) -> None:
+    if not isinstance(value, np.ndarray) or schemas.encoding_of(value) is None:
+        raise CannotKeep(f"{describe_value(value)} is not an image")
+
+
+def _bytes_of(value: np.ndarray[Any, Any]) -> Any:
+    """Return the content of an array in C order, without a copy if it lies so in memory."""
+    return value.reshape(-1).view(np.uint8).data if value.flags.c_contiguous and value.size else value.tobytes()
 
 
 def _compress(value: np.ndarray[Any, Any], how: Images) -> bytes:

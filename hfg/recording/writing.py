@@ -48,7 +48,8 @@ _NUMBERS: Final = frozenset({int, float, bool})
 _PLAIN: Final = {Token}
 _BETWEEN_FIRINGS: Final = frozenset({StructureChanged, NodeEnabled, TokensLeftOut})
 _MARKED_SCHEMA: Final = b'{"title":"hfg marker","type":"object"}'
-_EVENT_SCHEMA: Final = b'{"title":"hfg event","type":"object"}'
+EVENT_SCHEMA: Final = b'{"title":"hfg event","type":"object"}'
+"""Of events of a run."""
 
 
 class _Batch(NamedTuple):
@@ -85,7 +86,7 @@ class RecordingWriter:
         self.failed: Callable[[BaseException], None] = _nothing_to_say
         self._stream = stream
         self._exact = exact_times
-        self._encode = msgspec.json.Encoder(enc_hook=_text)
+        self._encode = msgspec.json.Encoder(enc_hook=as_text)
         self._something = threading.Event()
         self._finishing = False
         self._chunk_since = 0.0
@@ -246,7 +247,7 @@ class RecordingWriter:
     def _own_channel(self, topic: str) -> int:
         number = self._own.get(topic)
         if number is None:
-            schema = self._schema(topic.replace("/", "."), _EVENT_SCHEMA if topic == EVENTS else _MARKED_SCHEMA)
+            schema = self._schema(topic.replace("/", "."), EVENT_SCHEMA if topic == EVENTS else _MARKED_SCHEMA)
             number = self._own[topic] = self._file.add_channel(topic, schema, "json", {})
         return number
 
@@ -302,7 +303,7 @@ def _nanoseconds(seconds: Sequence[float]) -> npt.NDArray[np.uint64]:
     return (np.maximum(found, 0.0) * 1e9).astype(np.uint64)
 
 
-def _text(value: Any) -> Any:
+def as_text(value: Any) -> Any:
     """Return a text for a value that JSON does not support; for an event, whose values are only for reading."""
     return f"{value!r:.200}"
 

@@ -11,9 +11,9 @@ import os
 import socket
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import uvicorn
 
@@ -36,7 +36,6 @@ STATIC: Final = Path(__file__).with_name("static")
 """The built page; HFG_STUDIO_STATIC names another folder, for those who work on the page."""
 
 _LOGGER: Final = Log("hfg.studio")
-_PORTS: Final = range(8800, 8900)
 _LOCALHOST: Final = ("127.0.0.1", "::1")
 _NO_SUCH_ADDRESS: Final = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
 
@@ -83,7 +82,15 @@ class Server:
 
     Attributes:
       address: what the user opens, with the token.
+      loop: of the thread.
+      ports: those that are tried if none is given.
+      longest: message of a page, in bytes.
+      keeps_cookies: a page that comes back to the same port after a restart may enter again.
     """
+
+    ports: ClassVar[range] = range(8800, 8900)
+    longest: ClassVar[int] = LONGEST
+    keeps_cookies: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -105,7 +112,7 @@ class Server:
         need_guarded(host, encrypted=encrypted, insecure=insecure)
         if certfile is not None:
             _need_secret(keyfile or certfile)
-        self._sockets = _listening(host, port)
+        self._sockets = _listening(host, self.ports if port is None else [port])
         port = int(self._sockets[0].getsockname()[1])
         if sys.platform == "linux" and any(
             isinstance(one, OwnListener) and not one.is_guarded for one in self._sockets
@@ -118,27 +125,41 @@ class Server:
         shown = socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
         names = () if shown == host else (shown,)
         # A cookie that the network may have heard opens no other server.
-        self._kept = f"{port}-tls" if encrypted else f"{port}" if is_loopback(host) else ""
+        kept = f"{port}-tls" if encrypted else f"{port}" if is_loopback(host) else ""
+        self._kept = kept if self.keeps_cookies else ""
         secret = secret_of(self._kept) if self._kept else None
         self.entrance = Entrance(host, port, encrypted=encrypted, names=names, embedded=embedded, secret=secret)
         self.address = f"{'https' if encrypted else 'http'}://{shown}:{port}/?token={self.entrance.token}"
-        app = application(door, self.entrance, Path(os.environ.get("HFG_STUDIO_STATIC") or STATIC))
-        self._server = uvicorn.Server(_config(app, self._sockets, certfile, keyfile))
+        app = self.application(door)
+        self._server = uvicorn.Server(_config(app, self._sockets, certfile, keyfile, self.longest))
+        # The loop is named because it has to ask `OwnListener` for its connections; that of uvloop accepts them itself.
+        self.loop = asyncio.SelectorEventLoop()
         self._thread = threading.Thread(target=self._live, name="hfg studio server", daemon=True)
 
+    def application(self, door: Any) -> Any:
+        """Return what answers requests."""
+        return application(door, self.entrance, Path(os.environ.get("HFG_STUDIO_STATIC") or STATIC))
+
     def _live(self) -> None:
-        # The loop is named because it has to ask `OwnListener` for its connections; that of uvloop accepts them itself.
-        with asyncio.Runner(loop_factory=asyncio.SelectorEventLoop) as runner:
+        with asyncio.Runner(loop_factory=lambda: self.loop) as runner:
             runner.run(self._server.serve(sockets=self._sockets))
 
     def start(self) -> None:
         """Begin."""
         self._thread.start()
 
+    def ask_to_end(self) -> None:
+        """End soon."""
+        self._server.should_exit = True
+
+    def join(self) -> None:
+        """Wait until it has ended, 3 seconds at most."""
+        self._thread.join(3.0)
+
     async def stop(self) -> None:
         """End, and wait until the server has ended."""
-        self._server.should_exit = True
-        await asyncio.to_thread(self._thread.join, 3.0)
+        self.ask_to_end()
+        await asyncio.to_thread(self.join)
         for one in self._sockets:
             one.close()
         if self._kept:
@@ -159,12 +180,14 @@ def _need_secret(keyfile: str) -> None:
         raise TargetError(f"--keyfile: {'; '.join(exposure)}")
 
 
-def _config(app: Any, sockets: list[socket.socket], certfile: str | None, keyfile: str | None) -> uvicorn.Config:
+def _config(
+    app: Any, sockets: list[socket.socket], certfile: str | None, keyfile: str | None, longest: int
+) -> uvicorn.Config:
     return uvicorn.Config(
         app,
         http=bounded_http(sockets),
         ws=DiscreetWebSocket,
-        ws_max_size=LONGEST,
+        ws_max_size=longest,
         ws_ping_interval=20.0,
         ws_per_message_deflate=False,
         log_config=None,
@@ -178,15 +201,15 @@ def _config(app: Any, sockets: list[socket.socket], certfile: str | None, keyfil
     )
 
 
-def _listening(host: str, port: int | None) -> list[socket.socket]:
-    """Take the given port, or else the first free one; of "localhost", both addresses.
+def _listening(host: str, ports: Sequence[int]) -> list[socket.socket]:
+    """Take the first free one of the ports, or of several any other one if none is; of "localhost", both addresses.
 
     Browsers and tunnels to "localhost" try both. Another user who has one of the two would learn the token.
     """
     first = "127.0.0.1" if host == "localhost" else host
     others = [one for one in _LOCALHOST if one != first] if first in _LOCALHOST else []
     last: OSError | None = None
-    for one in (*_PORTS, 0) if port is None else (port,):
+    for one in (*ports, 0) if len(ports) > 1 else ports:
         sockets = []
         try:
             sockets.append(_bound(first, one))
@@ -203,7 +226,7 @@ def _listening(host: str, port: int | None) -> list[socket.socket]:
         else:
             return sockets
     assert last is not None
-    where = "any port" if port is None else f"port {port}"
+    where = "any port" if len(ports) > 1 else f"port {ports[0]}"
     raise TargetError(f"{where} of {last.filename} cannot be taken: {last.strerror}; name another one by --port")
 
 

@@ -27,7 +27,7 @@ from hfg.studio.entrance import Entrance
 from hfg.studio.messages import LONGEST, SUBPROTOCOL
 from hfg.studio.viewing import Frame
 
-__all__ = ["Door", "PageOutbox", "Visit", "application"]
+__all__ = ["Closing", "Door", "PageOutbox", "Visit", "application", "listen"]
 
 _LOGGER: Final = Log("hfg.studio")
 _MOST_FRAMES: Final = 1000
@@ -52,6 +52,13 @@ class Visit(Protocol):
 
     def leave(self) -> None:
         """The page is gone."""
+
+
+class Closing(Protocol):
+    """Ends the connection to a page."""
+
+    def close(self, code: int, reason: str) -> None:
+        """End it, when everything before is sent."""
 
 
 class Door(Protocol):
@@ -217,7 +224,7 @@ def application(door: Door, entrance: Entrance, static: Path) -> Any:
             return
         pump = asyncio.create_task(outbox.pump(socket), name="hfg studio page")
         try:
-            await _listen(socket, visit, outbox, pump)
+            await listen(socket, visit, outbox, pump)
         finally:
             visit.leave()
             pump.cancel()
@@ -229,7 +236,7 @@ def application(door: Door, entrance: Entrance, static: Path) -> Any:
     return _Guard(Starlette(routes=routes), entrance)
 
 
-async def _listen(socket: WebSocket, visit: Visit, outbox: PageOutbox, pump: asyncio.Task[None]) -> None:
+async def listen(socket: WebSocket, visit: Visit, outbox: Closing, pump: asyncio.Task[None]) -> None:
     """Read what a page says until one side is gone."""
     pace = _Pace()
     pump.add_done_callback(_told)

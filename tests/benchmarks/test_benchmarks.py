@@ -22,6 +22,7 @@ from benchmarks import (
     bench_robot,
     bench_start,
     bench_studio,
+    bench_viewers,
     figures,
     page,
     profile_hop,
@@ -73,7 +74,9 @@ def test_every_peer_takes_part_or_is_named_as_missing() -> None:
         assert (peer in rows) != (f"{peer} is not installed" in bench_peers.MISSING), peer
 
 
-@pytest.mark.parametrize("suite", [bench_goals, bench_links, bench_missions, bench_robot, bench_start, bench_studio])
+@pytest.mark.parametrize(
+    "suite", [bench_goals, bench_links, bench_missions, bench_robot, bench_start, bench_studio, bench_viewers]
+)
 def test_every_goal_has_its_cases_or_the_reason_why_not(suite: Any) -> None:
     assert suite.GOALS
     for goal in suite.GOALS:

@@ -300,6 +300,26 @@ class Run:
         self._need_running("there is nothing left to steer")
         return hooks.studio(self, port=port, read_only=read_only)
 
+    def foxglove(self, *, port: int | None = None, origins: Iterable[str] = ()) -> Any:  # noqa: ANN401 - likewise
+        """Let Foxglove show this run from now on: what a recording would write, encoded only while a viewer looks.
+
+        Call it on the run's loop. It ends with the run.
+
+        Args:
+          port: of this computer; default: the first free one from 8765.
+          origins: further origins of web pages that may look, "https://example.org"; the application of Foxglove may.
+
+        Returns:
+          The server, with its `address` to connect to. Give it only to people who may see what passes.
+
+        Raises:
+          UsageError: the extra `hfg[studio]` is not installed.
+          TargetError: the port is in use.
+          NotRunning: the run is over.
+        """
+        self._need_running("there is nothing left to see")
+        return hooks.foxglove(self, port=port, origins=origins)
+
     @overload
     def set(self, parameter: ParameterPort[T], value: T) -> None: ...
     @overload
