@@ -56,7 +56,9 @@ def cases() -> Iterator[tuple[str, str]]:
 @pytest.mark.parametrize(("suite", "case"), list(cases()))
 def test_every_case_runs_at_a_tiny_size(suite: str, case: str) -> None:
     figures = (
-        MODULES[suite].CASES[case].run({"bench_threads": 2, "bench_start": 1, "bench_robot": 6}.get(suite, TOKENS))
+        MODULES[suite]
+        .CASES[case]
+        .run({"bench_threads": 2, "bench_start": 1, "bench_robot": 6, "bench_tuning": 2}.get(suite, TOKENS))
     )
     values = list(figures.values()) if isinstance(figures, dict) else [figures]
     assert values
