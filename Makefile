@@ -14,7 +14,7 @@ RESULTS := benchmarks/results
 PEERS   := .venv-peers
 
 .DEFAULT_GOAL := help
-.PHONY: help demo follow studio photographs test test-fast lint bench peers bench-peers bench-goals bench-docs bench-links bench-studio docs docs-nodes docs-drawings docs-mermaid docs-studio web test-web soak setup clean
+.PHONY: help demo follow studio photographs test test-fast lint bench peers bench-peers bench-goals bench-docs bench-links bench-ros bench-studio docs docs-nodes docs-drawings docs-mermaid docs-studio web test-web soak setup clean
 
 help:
 	@echo "make demo    a robot fetches and delivers cubes; score, video and report in out/fetch_delivery, in less than 3 minutes"
@@ -25,7 +25,7 @@ help:
 	@echo "make test-fast   run those that take no time, in half a minute"
 	@echo "make lint    ruff, mypy and the check of our English"
 	@echo "make bench   run the benchmarks (bench-peers: with other libraries; bench-docs: write docs/speed.md;"
-	@echo "             bench-goals: the goals, and whether they are reached; bench-links: between processes; bench-studio: the page)"
+	@echo "             bench-goals: the goals, and whether they are reached; bench-links: between processes; bench-ros: ROS 2; bench-studio: the page)"
 	@echo "make docs    build the documentation as a site in build/site"
 	@echo "make docs-nodes   write docs/nodes from the docstrings of the library"
 	@echo "make docs-drawings   redraw the graphs in README and docs"
@@ -70,7 +70,7 @@ bench: $(READY)
 # The other libraries have an environment of their own, because hfg does not need them. If one cannot be installed, it is reported and skipped.
 peers: $(READY)
 	@test -x $(PEERS)/bin/python || "$(PYTHON)" -m venv $(PEERS)
-	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[examples,zenoh]'
+	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[examples,ros2]'
 	@grep -v '^#' benchmarks/peers/requirements.txt | while read -r peer; do \
 	  $(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check "$$peer" || echo "skipped: $$peer" >&2; done
 
@@ -84,6 +84,9 @@ bench-goals: peers
 
 bench-links: peers
 	$(PEERS)/bin/python -m benchmarks bench_links --json $(RESULTS)
+
+bench-ros: peers
+	$(PEERS)/bin/python -m benchmarks bench_ros --json $(RESULTS)
 
 # Needs Chromium.
 bench-studio: $(READY)

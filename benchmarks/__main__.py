@@ -37,7 +37,7 @@ SUITES = (
     "bench_tuning",
     "bench_virtual_day",
 )
-OTHERS = ("bench_peers", "bench_goals", "bench_links", "bench_studio", "bench_viewers")
+OTHERS = ("bench_peers", "bench_goals", "bench_links", "bench_ros", "bench_studio", "bench_viewers")
 T = TypeVar("T", str, Goal)
 
 
@@ -45,7 +45,7 @@ def main() -> int:
     """Run what was asked for and print the tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=(__doc__ or "").splitlines()[0])
     parser.add_argument(
-        "suites", nargs="*", default=SUITES, help=f"of {', '.join(SUITES + OTHERS)}; all but the last five by default"
+        "suites", nargs="*", default=SUITES, help=f"of {', '.join(SUITES + OTHERS)}; all but the last six by default"
     )
     parser.add_argument(
         "--runs", "--rounds", type=int, help="fresh processes per case; each suite has its own default, mostly 5"

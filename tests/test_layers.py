@@ -34,6 +34,7 @@ FLOORS = {
     "hfg.nodetypes": 2,
     "hfg.registry": 2,
     "hfg.ros": 2,
+    "hfg.ros.connection": 5,  # opens a session, which waits
     "hfg.graph": 3,
     "hfg.activity": 4,
     "hfg.analysis": 4,
@@ -79,6 +80,7 @@ SAME_FLOOR_PAIRS = {
     ("hfg.viewers", "hfg.studio"),  # its server, which checks who comes
     ("hfg.engine", "hfg.links.running"),
     ("hfg.links.pubsub", "hfg.links.running"),
+    ("hfg.ros.connection", "hfg.parts.transports"),  # finds Zenoh
     ("hfg.parts.transports", "hfg.links.local"),  # the one that is always there
     ("hfg.__main__", "hfg.cli"),
     ("hfg.testing", "hfg"),

@@ -24,7 +24,7 @@ _MODULES: Final[Mapping[str, str]] = {
     **{name: name for name in ("top", "agent")},
     **{name: name for name in ("tune", "sweep", "compare")},
     **dict.fromkeys(("deploy", "ps", "logs", "restart", "stop"), "runs"),
-    **{name: name for name in ("new", "keys", "studio")},
+    **{name: name for name in ("new", "keys", "studio", "ros")},
     **dict.fromkeys(("set", "edit", "undo", "redo", "reload", "pause", "resume", "step", "trigger"), "steer"),
 }
 

@@ -30,7 +30,7 @@ class Status(IntEnum):
     ABORTED = 6
 
 
-def goal_request(goal_id: bytes, goal: bytes) -> bytes:
+def goal_request(goal_id: bytes, goal: bytes | bytearray) -> bytes:
     """Return the request that sends a goal.
 
     Args:
@@ -40,7 +40,7 @@ def goal_request(goal_id: bytes, goal: bytes) -> bytes:
     return _HEADER + goal_id + goal[len(_HEADER) :]
 
 
-def is_accepted(response: bytes) -> bool:
+def is_accepted(response: bytes | bytearray) -> bool:
     """Read the response to a goal.
 
     Raises:
@@ -61,7 +61,7 @@ def cancel_request(goal_id: bytes) -> bytes:
     return _HEADER + goal_id + _NO_STAMP
 
 
-def read_feedback(message: bytes) -> tuple[bytes, bytes]:
+def read_feedback(message: bytes | bytearray) -> tuple[bytes, bytes]:
     """Return the goal's id and the feedback, encoded.
 
     Raises:
@@ -70,4 +70,4 @@ def read_feedback(message: bytes) -> tuple[bytes, bytes]:
     begin = len(_HEADER) + ID
     if len(message) < begin:
         raise EncodingError(f"the feedback has {len(message)} bytes, which is too short")
-    return message[len(_HEADER) : begin], message[: len(_HEADER)] + message[begin:]
+    return bytes(message[len(_HEADER) : begin]), _HEADER + bytes(message[begin:])

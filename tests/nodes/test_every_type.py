@@ -25,6 +25,10 @@ NEEDS: dict[str, str] = {
     "hfg.nodes.links:Subscribe": "a graph around it, which says the type",
     "hfg.nodes.mapping:load_map": "a map file",
     "hfg.nodes.mapping:save_map": "a map that is not tilted",
+    **dict.fromkeys(
+        (f"hfg.nodes.ros:Ros{name}" for name in ("Action", "Publish", "Service", "ServiceClient", "Subscribe")),
+        "a router of Zenoh",
+    ),
     "hfg.nodes.scenes:scene_of_clusters": "a cloud with clusters",
     "hfg.nodes.video:Camera": "a camera",
     "hfg.nodes.video:Screenshot": "a screen",

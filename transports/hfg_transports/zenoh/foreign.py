@@ -60,7 +60,7 @@ class ForeignRequest:
         self._query: zenoh.Query | None = query
         self._key = key
 
-    def answer(self, payload: bytes, attachment: bytes) -> None:
+    def answer(self, payload: bytes | bytearray, attachment: bytes) -> None:
         """Answer it; long answers block while they are sent."""
         self._end(lambda query: query.reply(self._key, payload, attachment=attachment))
 
@@ -143,7 +143,7 @@ class ForeignPublisher:
         self._waits = waits
         self._withdraw = withdraw
 
-    async def put(self, payload: bytes, attachment: bytes) -> None:
+    async def put(self, payload: bytes | bytearray, attachment: bytes) -> None:
         """Send one; in a thread if that may take time.
 
         Raises:
@@ -263,7 +263,7 @@ class ForeignSession:
 
         return self._until_closed(mailbox, self._raw.declare_queryable(key, binding.callback(arrived), complete=True))
 
-    async def ask(self, key: str, payload: bytes, attachment: bytes, *, timeout_s: float | None) -> bytes:
+    async def ask(self, key: str, payload: bytes | bytearray, attachment: bytes, *, timeout_s: float | None) -> bytes:
         """Return the first answer to a request; cancelling withdraws it.
 
         Raises:
