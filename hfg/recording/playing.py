@@ -28,7 +28,7 @@ from hfg.nodetypes.node import Node
 from hfg.ports.automatic import sent_of
 from hfg.recording.choosing import Choice, Recorded, idle_nodes
 from hfg.recording.messages import MARKERS
-from hfg.recording.reading import File, RecordingInfo
+from hfg.recording.reading import CDR, File, RecordingInfo
 from hfg.recording.stand_ins import How, stand_in
 from hfg.recording.tracks import recorded_ports
 
@@ -46,7 +46,7 @@ def _spoke(file: File) -> tuple[set[str], set[str]]:
     for number, _, data in file.messages():
         if number not in markers:
             found.add(file.channels[number].topic)
-            if _BESIDE in data:
+            if _BESIDE in data and file.channels[number].message_encoding != CDR:
                 beside.add(file.channels[number].topic)
         else:
             found.add(str(file.object_in(data).get("port")))

@@ -18,17 +18,19 @@ from mcap.records import Channel, Schema
 
 from hfg.encoding.plain import json_value
 from hfg.errors import UsageError
+from hfg.recording.bags import RECOVERED, opened
 from hfg.recording.chunks import Budget, Content, Damaged, content_of, unpacked
 from hfg.recording.layout import Layout, read_record
 from hfg.recording.mcap import MAGIC
 from hfg.recording.messages import EVENTS, MARKERS
 
+CDR: Final = "cdr"
+"""The encoding of messages of ROS 2."""
+
 _KEPT_CHUNKS: Final = 8
 _KEPT_BYTES: Final = 64 * 2**20
 _MOST_TOLD: Final = 100
 _FURTHEST_NS: Final = 2.0**62
-RECOVERED: Final = "hfg:recovered"
-"""The metadata in which a recovered file lists its losses."""
 
 RawMessage = tuple[int, int, bytes]
 """Channel, nanoseconds, data."""
@@ -138,7 +140,7 @@ class File:
         self._lost: dict[int, Loss] = {}  # by number of the piece
         self.when_lost: Callable[[Loss], object] = _nobody
         try:
-            self._stream: BinaryIO = self.path.open("rb")
+            self._stream: BinaryIO = opened(self.path, File)
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
             raise UsageError(f"cannot open the recording {path}: {why}") from None
@@ -203,6 +205,8 @@ class File:
             if event.get("type") == "RunStarted":
                 return number_in(event.get("time"))
             break
+        if not self._about():  # another program has written it
+            return next((when for _, when, _ in self.messages()), 0) / 1e9
         return number_in(self._about().get("began", 0.0))
 
     def object_in(self, data: bytes) -> dict[str, Any]:
@@ -231,7 +235,7 @@ class File:
         about, ended = self._about(), self.metadata.get("hfg:end", {})
         return RecordingInfo(
             path=str(self.path),
-            bytes=self.path.stat().st_size,
+            bytes=self.layout.size,
             whole=self.whole,
             library=self.library,
             graph=about.get("graph", ""),
@@ -263,7 +267,8 @@ class File:
         about = channel.metadata
         rate = count / duration if duration else 0.0
         name = schema.name if schema is not None else ""
-        return PortInfo(channel.topic, about.get("kind", ""), about.get("type", ""), name, count, rate)
+        type_ = about.get("type", "") or (name if channel.message_encoding == CDR else "")
+        return PortInfo(channel.topic, about.get("kind", ""), type_, name, count, rate)
 
     # --- what cannot be read ------------------------------------------------------------------------------------------
 

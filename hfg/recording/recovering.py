@@ -18,9 +18,10 @@ from mcap.writer import CompressionType, Writer
 
 from hfg.base.whole import write_whole
 from hfg.errors import UsageError
+from hfg.recording.bags import RECOVERED
 from hfg.recording.chunks import Damaged
 from hfg.recording.layout import read_record
-from hfg.recording.reading import RECOVERED, File, Loss
+from hfg.recording.reading import File, Loss
 from hfg.recording.writing import is_there
 
 

@@ -16,7 +16,8 @@ from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.errors import HfgError, UsageError, in_words
 from hfg.ports.automatic import sent_of
 from hfg.recording.messages import EVENTS, MARKERS, TokenReader
-from hfg.recording.reading import File, number_in
+from hfg.recording.reading import CDR, File, number_in
+from hfg.recording.rosmessages import reader_of
 from hfg.types import accepts, describe
 
 _PROCESSED = "processed"
@@ -145,11 +146,11 @@ class Track:
             if channel.topic in ports:
                 schema = file.schemas.get(channel.schema_id)
                 hint = ports[channel.topic]
-                reader = TokenReader(schema.name if schema is not None else "", hint, may_pickle=may_pickle)
+                reader = reader_of(channel, schema, hint, may_pickle=may_pickle)
                 self._readers[number] = (channel, reader, hint)
                 self._kinds[channel.topic] = _kind(channel.metadata)
                 self._node = channel.metadata.get("node", "")
-                self.of_source = channel.metadata.get("source") == "true"
+                self.of_source = channel.metadata.get("source") == "true" or channel.message_encoding == CDR
         kinds = set(self._kinds.values())
         self._closes = bool(kinds & {"output", _PROCESSED})  # the ports include one that shows when a firing is over
         self._has_outputs = "output" in kinds
@@ -259,7 +260,8 @@ class Track:
             wanted |= self._events
         node = self._node
         for number, ns, data in self._file.messages(wanted):
-            message = self._file.object_in(data)
+            known = self._readers.get(number)
+            message = self._file.object_in(data) if known is None else known[1].fields(data, ns, self._file.object_in)
             if number in self._events:
                 if message.get("type") == "NodeEnded" and message.get("node") == node:
                     yield Record("", number_in(message.get("time")), _END, {})
