@@ -9,6 +9,9 @@ course      activity, parameters, edits and errors by time
 seeking     messages by time, chunk by chunk              `hfg studio run.mcap`
 reading     files, including damaged ones                 `hfg info`
 recovering  makes a complete file of an incomplete one    `hfg recover`
+exporting   writes a bag of ROS 2                        `hfg recover --format rosbag2`
+bags        opens a bag of ROS 2 as a file
+rosmessages tokens from messages of ROS 2
 recording   which ports, description of the run           `run.record`, `hfg record`
 writing     the thread that encodes and writes
 mcap        the file: chunks, indexes, summary
@@ -20,9 +23,22 @@ foxglove    Foxglove's schemas for scans, clouds, grids, poses and transforms
 values      values as JSON and back, bit for bit
 """
 
+from hfg.recording.exporting import Exported, export_bag
 from hfg.recording.playing import Playing, play_into
 from hfg.recording.reading import File, Loss, PortInfo, RecordingInfo
 from hfg.recording.recording import Recording, record
 from hfg.recording.recovering import recover
 
-__all__ = ["File", "Loss", "Playing", "PortInfo", "Recording", "RecordingInfo", "play_into", "record", "recover"]
+__all__ = [
+    "Exported",
+    "File",
+    "Loss",
+    "Playing",
+    "PortInfo",
+    "Recording",
+    "RecordingInfo",
+    "export_bag",
+    "play_into",
+    "record",
+    "recover",
+]

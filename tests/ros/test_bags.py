@@ -17,7 +17,7 @@ from examples.fetch_delivery.perception.records import Localised
 from examples.fetch_delivery.world import Simulation
 from hfg.errors import UsageError
 from hfg.geometry import LaserScan, Transform
-from hfg.recording import File, play_into
+from hfg.recording import File, export_bag, play_into, record
 from hfg.ros import message
 from hfg.testing import Recorder
 
@@ -120,6 +120,47 @@ def test_folders_that_are_not_bags_are_refused(prepare: Any, sentence: str, tmp_
         File(tmp_path)
 
 
+@hfg.node
+def laser(*, count: int = 5) -> Iterator[LaserScan]:
+    """Give scans."""
+    for one in range(count):
+        yield LaserScan("laser", float(one), np.arange(4.0) + one, -1.0, 0.5)
+
+
+@hfg.node
+def nearest(scan: LaserScan) -> float:
+    """Return how near anything is."""
+    return float(scan.ranges.min())
+
+
+@hfg.node
+def pair(distance: float) -> tuple[int, float]:
+    """Return values that ROS 2 does not have."""
+    return 1, distance
+
+
+@hfg.node
+def take_pair(value: tuple[int, float]) -> None:
+    """Take it."""
+
+
+def test_a_recording_is_written_as_a_bag_that_says_the_same(tmp_path: Path) -> None:
+    graph = hfg.Graph("robot")
+    graph.add(laser(), max_rate_hz=10) >> graph.add(nearest()) >> graph.add(pair()) >> graph.add(take_pair())
+    hfg.run(graph, clock="virtual", begin=lambda run: record(run, tmp_path / "run.mcap"))
+    done = export_bag(tmp_path / "run.mcap", tmp_path / "bag")
+    assert (done.written, done.left_out) == ({"/laser/out": 5, "/nearest/out": 5}, {"pair.out": 5})
+    assert done.why["pair.out"].startswith("ROS 2 has no message for values of tuple")
+    with rosbag2.Reader(tmp_path / "bag") as bag:
+        found = [(one.topic, when, one.msgtype, bytes(data)) for one, when, data in bag.messages()]
+    scans = [(when, message(name).decode(data)) for topic, when, name, data in found if topic == "/laser/out"]
+    assert [(when, scan.ranges[0]) for when, scan in scans] == [(one * 10**8, one) for one in range(5)]
+    again = export_bag(tmp_path / "bag", tmp_path / "again")
+    assert (again.written, again.left_out) == (done.written, {})
+    with pytest.raises(UsageError, match="cannot write the bag"):
+        export_bag(tmp_path / "run.mcap", tmp_path / "bag")
+
+
 # --- the delivery robot ---
 
 
@@ -143,7 +184,8 @@ def as_odometry(value: Any) -> messages.Odometry:
 @hfg.node
 def size_of(image: np.ndarray[Any, Any]) -> tuple[int, ...]:
     """Return the size of a picture."""
-    return image.shape
+    shape: tuple[int, ...] = image.shape
+    return shape
 
 
 @hfg.node
