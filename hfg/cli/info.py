@@ -14,7 +14,7 @@ from hfg.recording import File, Loss, RecordingInfo
 
 
 def info(
-    file: Annotated[Path, typer.Argument(help="a recording, or any MCAP file")],
+    file: Annotated[Path, typer.Argument(help="a recording, any MCAP file, or a bag of ROS 2")],
     json: Annotated[bool, typer.Option("--json", help="Write JSON.")] = False,
 ) -> int:
     """Show what a recording contains: ports, types, counts, rates, and damage."""

@@ -20,7 +20,7 @@ from hfg.recording import record as begin_recording
 
 
 def play(
-    file: Annotated[Path, typer.Argument(help="a recording, as hfg record writes it")],
+    file: Annotated[Path, typer.Argument(help="a recording, or a bag of ROS 2")],
     into: Annotated[str, typer.Option("--into", metavar="TARGET", help="The graph: module:graph or file.py.")],
     flags: RunFlags,
     views: ViewFlags,
