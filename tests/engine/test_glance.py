@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
+from typing import Literal
 
 import pytest
 
@@ -114,3 +115,13 @@ def test_a_glance_tells_what_monitors_have_found_and_how_old_data_has_become() -
         "numbers": (0.0, 0.0),
         "slowly": (0.1, 0.3),
     }
+
+
+@pytest.mark.rule("R7")
+@pytest.mark.parametrize("clock", ["real", "virtual"])
+def test_after_a_run_a_glance_and_statistics_still_count_its_firings(clock: Literal["real", "virtual"]) -> None:
+    runs: list[hfg.Run] = []
+    graph = build()
+    report = hfg.run(graph, clock=clock, begin=runs.append)
+    assert {node.path for node in runs[0].glance().nodes} >= set(report.nodes) - {"box"}
+    assert runs[0].statistics().firings == report.firings > 0

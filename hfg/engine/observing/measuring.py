@@ -110,7 +110,7 @@ class Measuring:
         loop: Any = engine.loop
         if isinstance(loop, VirtualTimeLoop):
             loop.watchers.append(self._passed)
-        else:
+        elif engine.ended_how is None:  # after the run its loop may be closed
             self._timer = loop.call_later(_LOOK_EVERY_S, self._look, context=engine.context)
         if engine.ended_how is not None:
             self._end()
@@ -155,7 +155,7 @@ class Measuring:
         loop: Any = self._engine.loop
         if self._timer is not None:
             self._timer.cancel()
-        else:
+        elif isinstance(loop, VirtualTimeLoop):
             loop.watchers.remove(self._passed)
 
     def fold_due(self) -> None:
