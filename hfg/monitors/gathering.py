@@ -169,7 +169,7 @@ class Gathered(_Telling):
         if self._is_over:
             return
         if len(self._waiting) >= _MOST_WAITING:
-            waited = ", ".join(f'"{one}"' for one in sorted(self._asked))
+            waited = ", ".join(f'"{one}"' for one in sorted(self._asked or self._far))
             self._lose(f"{_MOST_WAITING:,} points have come while the process of group {waited} has not answered")
             return
         if part in self._known:

@@ -13,7 +13,7 @@ import hfg
 from hfg import commands
 from hfg import monitors as m
 from hfg.errors import GraphError, MonitorViolated, UsageError
-from hfg.monitors import Property, Verdict
+from hfg.monitors import Property, Verdict, gathering
 from hfg.parts.processes import launching
 from hfg_transports.memory import Faults, Network
 from tests.monitors.slow import random_formula
@@ -94,13 +94,28 @@ def test_a_violation_over_two_processes_can_end_the_run_also_at_its_very_end(num
         hfg.run(graph, clock="virtual")
 
 
+class Slow(launching.LoopLauncher):
+    """All that processes say to each other takes 20 ms."""
+
+    def __init__(self) -> None:
+        super().__init__(network=Network(Faults(delay_s=(0.02, 0.02)), seed=1))
+
+
+def test_a_process_that_does_not_answer_ends_the_monitor_before_too_many_points_wait(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(launching, "LoopLauncher", Slow)
+    monkeypatch.setattr(gathering, "_MOST_WAITING", 5)
+    graph = cut(chain(rate_hz=1000.0), far=["sink"])
+    graph.monitor("few", "never(sent(ticks.out) & fired(ticks) & sent(double.out) & fired(double) & fired(sink))")
+    monitors, report = found(graph)
+    assert monitors.verdicts == {"few": Verdict.UNKNOWN}
+    assert '5 points have come while the process of group "far" has not answered; nothing more' in report.errors[0]
+
+
 def test_a_violation_that_is_told_when_the_time_is_up_fails_the_run_all_the_same(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    class Slow(launching.LoopLauncher):
-        def __init__(self) -> None:
-            super().__init__(network=Network(Faults(delay_s=(0.02, 0.02)), seed=1))
-
     monkeypatch.setattr(launching, "LoopLauncher", Slow)
     graph = cut(chain(), far=["double"])
     graph.monitor("few", "never(sent(double.out, value == 8) & once(sent(ticks.out)))", on_violation="fail")
