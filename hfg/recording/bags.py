@@ -6,6 +6,8 @@ opened for the first time, so that all readers have one format; see https://gith
 
 from __future__ import annotations
 
+import io
+import os
 import re
 import sqlite3
 import tempfile
@@ -63,7 +65,7 @@ def opened(path: Path, read: Callable[[Path], Any]) -> BinaryIO:
         while len(_copies) >= _MOST_KEPT:
             _copies.pop(next(iter(_copies))).close()
         _copies[key] = _copied(files, read)
-    return Path(_copies[key].name).open("rb")
+    return io.BufferedReader(_View(_copies[key].fileno()))
 
 
 def _files(folder: Path) -> list[Path]:
@@ -71,13 +73,16 @@ def _files(folder: Path) -> list[Path]:
     known = [one for one in folder.iterdir() if one.suffix in (".mcap", ".db3", ".zstd")][: _MOST_FILES + 1]
     if any(one.suffix == ".zstd" for one in known):
         raise UsageError(f"the files in {folder} are compressed as a whole: unpack them first, as in unzstd FILE")
+    bases = {re.sub(r"(_\d+)?\.\w+$", "", one.name) for one in known}
+    if len(bases) > 1 and not (folder / "metadata.yaml").exists():
+        raise UsageError(f"{folder} is not a bag of ROS 2: its files belong to several; name one of the files")
     if not known or len(known) > _MOST_FILES:
         raise UsageError(f"{folder} is not a bag of ROS 2: it has {len(known):,} files .mcap or .db3")
     return sorted(known, key=lambda one: [(len(part), part) for part in re.split(r"(\d+)", one.name)])
 
 
 def _copied(files: list[Path], read: Callable[[Path], Any]) -> Any:
-    into: Any = tempfile.NamedTemporaryFile(prefix="hfg-bag-", suffix=".mcap")  # noqa: SIM115 - kept open
+    into: Any = tempfile.TemporaryFile()  # noqa: SIM115 - kept open; it has no name, so nothing remains of it
     try:
         losses: list[dict[str, Any]] = []
         writer = Writer(into, library="rosbag2", profile="ros2")
@@ -94,6 +99,39 @@ def _copied(files: list[Path], read: Callable[[Path], Any]) -> Any:
         into.close()
         raise
     return into
+
+
+class _View(io.RawIOBase):
+    """A file that is read from a place of its own."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = os.dup(descriptor)
+        self._at = 0
+
+    def fileno(self) -> int:
+        return self._descriptor
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        begin = (0, self._at, os.fstat(self._descriptor).st_size)[whence]
+        self._at = begin + offset
+        return self._at
+
+    def readinto(self, buffer: Any) -> int:
+        data = os.pread(self._descriptor, len(buffer), self._at)
+        buffer[: len(data)] = data
+        self._at += len(data)
+        return len(data)
+
+    def close(self) -> None:
+        if not self.closed:
+            os.close(self._descriptor)
+        super().close()
 
 
 class _Copy:

@@ -29,7 +29,6 @@ from hfg.recording.chunks import Damaged
 from hfg.recording.course import Course
 from hfg.recording.messages import EVENTS, TokenReader
 from hfg.recording.reading import File, nanoseconds_in, number_in
-from hfg.recording.rosmessages import reader_of
 from hfg.recording.seeking import Found, Seeking
 from hfg.recording.tracks import recorded_ports
 
@@ -260,7 +259,7 @@ class Values:
                 hint: Any = graph[path].type
             except (AttributeError, HfgError):
                 hint = Any
-            readers[number] = reader_of(file.channels[number], schema, hint, may_pickle=False)
+            readers[number] = TokenReader("" if schema is None else schema.name, hint, may_pickle=False)
         with self._lock:
             self._readers = readers
             self._kept.clear()
@@ -280,7 +279,7 @@ class Values:
             reader = self._readers[found.channel]
         data = self._recorded.seeking.read(found)
         try:
-            message = reader.fields(data, found.time, json_value)
+            message = json_value(data)
             token = _token(reader, message)
         except Exception as error:  # the data may make numpy or OpenCV raise anything
             raise Damaged(f"this value cannot be read: {error}") from None

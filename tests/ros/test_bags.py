@@ -111,6 +111,7 @@ def test_a_database_that_is_damaged_gives_what_can_be_read_and_says_the_rest(tmp
         (lambda folder: (folder / "a.db3").write_bytes(b"SQLite format 3\0" + bytes(99)), "is not a bag of ROS 2"),
         (lambda folder: sqlite3.connect(folder / "a.db3").execute("CREATE VIEW messages AS SELECT 1"), "no tables"),
         (lambda folder: (folder / "a.mcap.zstd").write_bytes(b""), "unpack them first"),
+        (lambda folder: [(folder / name).write_bytes(b"") for name in ("a.mcap", "b.mcap")], "belong to several"),
         (lambda folder: (folder / "a.txt").write_bytes(b""), "it has 0 files .mcap or .db3"),
     ],
 )
