@@ -80,6 +80,10 @@ class MessageType:
         Raises:
           EncodingError: the value is not of the type, or does not fit into the message.
         """
+        return bytes(self.encode_once(value, stamp=stamp, frame_id=frame_id))
+
+    def encode_once(self, value: Any, *, stamp: float = 0.0, frame_id: str = "") -> bytearray:
+        """Return the same as `encode`, without its copy, which costs as much time as the rest of an image."""
         if self._conversion is not None and not isinstance(value, self.record | Mapping):
             header = values.Header(stamp, frame_id)
             try:
@@ -88,7 +92,7 @@ class MessageType:
                 raise EncodingError(f"{self.name}: {error}") from None
             except (AttributeError, TypeError, ValueError, OverflowError) as error:
                 raise EncodingError(f"{value!r:.80} cannot be sent as {self.name}: {error}") from None
-        return self.pack(value)
+        return self._packed(value)
 
     def decode(self, buffer: Buffer) -> Any:
         """Return the value of a message, of `value_type`. Its arrays may be views of the buffer, and cannot be written.
@@ -110,13 +114,17 @@ class MessageType:
         Raises:
           EncodingError: a field does not fit; the message names it.
         """
+        return bytes(self._packed(record))
+
+    def _packed(self, record: Record | Mapping[str, Any]) -> bytearray:
         fitting = self._types.fit(self.name)(record, self.name.rpartition("/")[2])
         store = self._types.store
         try:
             made: memoryview = store.serialize_cdr(fitting, self.name, little_endian=True)
         except (OverflowError, struct.error, UnicodeEncodeError) as error:
             raise EncodingError(f"a record of {self.name} cannot be encoded: {error}") from None
-        return bytes(made)
+        buffer = made.obj
+        return buffer if isinstance(buffer, bytearray) and len(buffer) == made.nbytes else bytearray(made)
 
     def unpack(self, buffer: Buffer) -> Record:
         """Return the record of a message; see `decode`.

@@ -157,7 +157,7 @@ class RosPublish(RosNode):
 
     async def process(self, value: Token[Any]) -> None:
         """Publish it."""
-        payload = self._message.encode(value.value, stamp=value.stamp)
+        payload = self._message.encode_once(value.value, stamp=value.stamp)
         if self._publisher is None and self._is_kept:
             self._lost += len(self._kept) == self._kept.maxlen
             self._kept.append(payload)
