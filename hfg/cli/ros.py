@@ -96,6 +96,7 @@ def _echo(
 async def _print(
     topic: str, type_: str, router: str, domain: int, limit: int | None, durability: str, json: bool
 ) -> int:
+    from hfg.nodes.flow import relay
     from hfg.nodes.ros import RosSubscribe  # needs the extra
 
     graph = Graph("hfg_echo")
@@ -104,6 +105,7 @@ async def _print(
             topic=full_name(topic, "/", "hfg_echo"), type=type_, router=router, domain=domain, durability=durability
         )
     )
+    graph.connect(node.out, graph.add(relay()).value)  # only edges can be tapped
     async with running(graph) as run:
         looking = run.tap("ros_subscribe.out", size=1_000)
         printed = 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -66,7 +67,9 @@ def listener(topic: str, kind: str = STRING, **parameters: Any) -> tuple[hfg.Gra
     return graph, subscribe, keep
 
 
-async def test_who_joins_later_gets_what_a_transient_local_publisher_has_kept(router: Router) -> None:
+async def test_who_joins_later_gets_what_a_transient_local_publisher_has_kept(
+    router: Router, capsys: pytest.CaptureFixture[str]
+) -> None:
     at: dict[str, Any] = {"router": router.address, "durability": "transient_local", "depth": 2}
     graph, say, publish = talker("latched", **at)
     async with hfg.running(graph) as run:
@@ -81,6 +84,9 @@ async def test_who_joins_later_gets_what_a_transient_local_publisher_has_kept(ro
             assert keep.kept == ["b", "c", "d"]
             assert subscribe.statistics()["lost"] == 0
             other.stop()
+        echo = ["ros", "echo", "/latched", "-n", "2", "--durability", "transient_local", "--router", router.address]
+        assert await asyncio.to_thread(main, echo) == 0
+        assert [line.split("s  ")[1] for line in capsys.readouterr().out.splitlines()] == ["'c'", "'d'"]
         run.stop()
 
 
@@ -222,6 +228,19 @@ async def test_without_a_server_a_client_fails_with_one_sentence(router: Router)
 
     with pytest.raises(NodeError, match=r'"/nobody" \(std_srvs/srv/SetBool\) at "tcp/.*no server is there for 0.2 s'):
         await ask()
+
+
+async def test_a_settings_file_names_the_router(router: Router, tmp_path: Path) -> None:
+    file = tmp_path / "cell.toml"
+    file.write_text(f'connect = ["{router.address}"]\ninsecure = true\n')
+    graph, say, publish = talker("by_file", router=str(file), reliability="best_effort")
+    other, _, keep = listener("by_file", router=router.address, namespace="/", node="ear")
+    async with hfg.running(graph) as run, hfg.running(other) as second:
+        await until(lambda: publish.statistics()["here"])
+        await run.trigger(say.say, "heard")
+        await until(lambda: keep.kept == ["heard"])
+        run.stop()
+        second.stop()
 
 
 @pytest.mark.parametrize(
