@@ -16,7 +16,8 @@ from hfg.errors import HfgError, UsageError
 from hfg.geometry import FrameTransform, Grid, LaserScan, PointCloud, PoseInFrame, Twist
 from hfg.recording.messages import EVENTS, MARKERS, TokenReader
 from hfg.recording.reading import CDR, File, Loss
-from hfg.ros.messages import MessageType, message, types_of
+from hfg.recording.rosmessages import type_of
+from hfg.ros.messages import MessageType, message
 
 _TYPES: Final[dict[str, tuple[Any, str]]] = {
     "hfg.bool": (bool, "std_msgs/msg/Bool"),
@@ -110,8 +111,7 @@ def _topic(recording: File, channel: Channel, bag: Any) -> _Topic | str:
     schema = recording.schemas.get(channel.schema_id)
     name = "" if schema is None else schema.name
     if channel.message_encoding == CDR and schema is not None:
-        kind = types_of(name, schema.data.decode("utf-8", "replace") if schema.encoding == "ros2msg" else "")
-        return _Topic(_connected(bag, channel.topic, kind), bytes)
+        return _Topic(_connected(bag, channel.topic, type_of(schema)), bytes)
     if name not in _TYPES:
         return f"ROS 2 has no message for values of {channel.metadata.get('type') or name or 'an unknown type'}"
     hint, type_ = _TYPES[name]

@@ -27,23 +27,27 @@ def reader_of(channel: Channel, schema: Schema | None, hint: Any, *, may_pickle:
     return TokenReader("" if schema is None else schema.name, hint, may_pickle=may_pickle)
 
 
+def type_of(schema: Schema) -> MessageType:
+    """Return the type of a channel's messages.
+
+    Raises:
+      UsageError: it is unknown, and its definition cannot be read.
+    """
+    return types_of(schema.name, schema.data.decode("utf-8", "replace") if schema.encoding == "ros2msg" else "")
+
+
 class RosReader(TokenReader):
     """Makes tokens from messages of ROS 2, with the stamps in their headers, or else the times they were written."""
 
     def __init__(self, schema: Schema, hint: Any) -> None:
         super().__init__(schema.name, hint, may_pickle=False)
-        self._schema, self._hint = schema, hint
-        self._type: MessageType | None = None
-
-    def _known(self) -> MessageType:
-        if self._type is None:
-            text = self._schema.data.decode("utf-8", "replace") if self._schema.encoding == "ros2msg" else ""
-            self._type = types_of(self._schema.name, text)
-        return self._type
+        known = type_of(schema)
+        self._stamp = known.stamp
+        self._decode = known.unpack if hint is known.record else known.decode
 
     def fields(self, data: bytes, ns: int, plain: Callable[[bytes], Any]) -> Any:
         """Return the message as it is, and its stamp."""
-        return {"value": data, "stamp": self._known().stamp(data) or ns / 1e9}
+        return {"value": data, "stamp": self._stamp(data) or ns / 1e9}
 
     def token(self, message: dict[str, Any]) -> Token[Any]:
         """Return the token of a message.
@@ -51,6 +55,4 @@ class RosReader(TokenReader):
         Raises:
           EncodingError: it is not of its type.
         """
-        known = self._known()
-        decode = known.unpack if self._hint is known.record else known.decode
-        return Token(decode(message["value"]), 0, message["stamp"])
+        return Token(self._decode(message["value"]), 0, message["stamp"])

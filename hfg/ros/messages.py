@@ -54,6 +54,7 @@ class MessageType:
         self._types = types
         self.record = types.record(name)
         self._size = of.size_of(name, types.known)
+        types.store.get_msgdef(name)  # makes code, which would hold up the first message
         self._conversion = values.conversion(name) if types.is_standard(name) else None
         self.value_type: Any = self.record if self._conversion is None else self._conversion.value_type
         first = types.known[name][0][1]
