@@ -31,6 +31,7 @@ from hfg.recording.messages import MARKERS
 from hfg.recording.reading import CDR, File, RecordingInfo
 from hfg.recording.stand_ins import How, stand_in
 from hfg.recording.tracks import recorded_ports
+from hfg.ros.messages import shared
 
 _LOGGER = Log("hfg.recording")
 _BESIDE: Final = b'"beside":true'
@@ -126,6 +127,8 @@ def play_into(
     playing = Playing()
     with File(path) as recording:
         recorded = recorded_ports(recording)
+        if any(one.message_encoding == CDR for one in recorded.values()):
+            shared()  # takes part of a second, which would hold up the run
         spoke, beside = _spoke(recording)
         info = recording.info()
         playing.is_damaged = bool(info.losses)
