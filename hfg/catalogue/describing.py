@@ -5,6 +5,7 @@ Depends on node types and `documentation`.
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import sys
 from collections.abc import Iterable, Iterator
@@ -194,7 +195,7 @@ def describe_type(of: NodeType | type[Node] | NodeFunction[..., Any], *, offered
       ('Halve a number.', 'float', 'half of it.')
     """
     kind = of if isinstance(of, NodeType) else of._type
-    read = read_documentation(kind.doc)
+    read = _with_inherited(kind)
     reference = kind.reference or f"{kind.module}:{kind.qualname}"
     module, _, title = reference.partition(":")
     return TypeDescription(
@@ -218,6 +219,19 @@ def describe_type(of: NodeType | type[Node] | NodeFunction[..., Any], *, offered
         errors=tuple(ErrorDescription(name, when) for name, when in read.errors),
         apex=read.apex,
     )
+
+
+def _with_inherited(kind: NodeType) -> Documentation:
+    """Read the docstring of a type; for ports, parameters and errors that it inherits, those of its bases."""
+    read = read_documentation(kind.doc)
+    bases = [
+        one._type.doc for one in getattr(kind.origin, "__mro__", ())[1:] if issubclass(one, Node) and one is not Node
+    ]
+    for base in map(read_documentation, bases):
+        told = {name for name, _ in read.errors}
+        errors = (*read.errors, *(one for one in base.errors if one[0] not in told))
+        read = dataclasses.replace(read, entries={**base.entries, **read.entries}, errors=errors)
+    return read
 
 
 def _completed(kind: NodeType, read: Documentation) -> tuple[PortDescription, ...]:

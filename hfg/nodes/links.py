@@ -27,6 +27,7 @@ from hfg.links.offers import need_link_name
 from hfg.links.pubsub import OutboxFile, Publication, Subscription
 from hfg.nodes._sessions import share
 from hfg.nodes.files.access import is_a_path
+from hfg.nodetypes.counting import Counting
 from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, Source, Target
 from hfg.types import describe
@@ -34,7 +35,7 @@ from hfg.types import describe
 __all__ = ["Publish", "Subscribe", "publish", "subscribe"]
 
 
-class Publish(Node):
+class Publish(Counting, Node):
     """Send all values to the programs that subscribe to a name.
 
     Subscribers that want every value get every value from the moment they join, once and in order, and slow this node
@@ -119,7 +120,7 @@ class Publish(Node):
         return _statistics(self)
 
 
-class Subscribe(Node):
+class Subscribe(Counting, Node):
     """Send what another program publishes by a name: a source that waits for it.
 
     It waits for a publisher, and subscribes to the first one that matches; when this one has gone, to the next. The

@@ -1,17 +1,17 @@
 """Access control: a token once, then a cookie; the right Host against rebinding, the right Origin against other pages.
 
-A page that can create nodes can run code, so the token is worth as much as the user's shell (rule L5). Depends on the
-standard library.
+A page that can create nodes can run code, so the token is worth as much as the user's shell (rule L5).
+Depends on hosts.
 """
 
 from __future__ import annotations
 
 import hmac
-import ipaddress
 import secrets
 from collections.abc import Iterable, Mapping
 from typing import Final
 
+from hfg.base.hosts import Hosts, is_loopback
 from hfg.errors import TargetError
 
 __all__ = ["Entrance", "is_loopback", "need_guarded"]
@@ -31,17 +31,6 @@ _HEADERS: Final[Mapping[str, str]] = {
 }
 
 _TOKEN_BYTES: Final = 24
-_LOOPBACK: Final = ("localhost", "127.0.0.1", "[::1]")
-
-
-def is_loopback(host: str) -> bool:
-    """Return whether only this machine can reach a host."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def need_guarded(host: str, *, encrypted: bool, insecure: bool) -> None:
@@ -58,7 +47,7 @@ def need_guarded(host: str, *, encrypted: bool, insecure: bool) -> None:
     )
 
 
-class Entrance:
+class Entrance(Hosts):
     """Checks every request of one server.
 
     Attributes:
@@ -87,25 +76,12 @@ class Entrance:
           embedded: notebooks of this machine may show the page in a frame.
           secret: the value of the cookie; default: a new one.
         """
+        super().__init__(host, port, encrypted=encrypted, names=names)
         policy = _POLICY + (_NOTEBOOKS if embedded else "'none'")
         self.headers = {"Content-Security-Policy": policy, **_HEADERS}
         self.token = secrets.token_urlsafe(_TOKEN_BYTES)
         self.cookie = f"hfg-{port}"
         self._secret = secret or secrets.token_urlsafe(_TOKEN_BYTES)
-        self._scheme = "https" if encrypted else "http"
-        named = f"[{host}]" if ":" in host else host
-        hosts = {*_LOOPBACK, *names, *(() if _is_any(host) else (named,))}
-        self._hosts = {f"{one}:{port}" for one in hosts} | (hosts if port == (443 if encrypted else 80) else set())
-        self._any_host = _is_any(host)
-        self.encrypted = encrypted
-
-    def is_host(self, host: str) -> bool:
-        """Return whether a request was meant for this server: another name may be rebound to its address."""
-        return host in self._hosts or (self._any_host and _is_address(host))
-
-    def is_origin(self, origin: str | None, host: str) -> bool:
-        """Return whether a page of this very server asks."""
-        return origin == f"{self._scheme}://{host}"
 
     def is_token(self, token: str) -> bool:
         """Return whether it is the token of the address."""
@@ -125,17 +101,3 @@ class Entrance:
         """The header that gives the cookie."""
         secure = "; Secure" if self.encrypted else ""
         return f"{self.cookie}={self._secret}; HttpOnly; SameSite=Strict; Path=/{secure}"
-
-
-def _is_any(host: str) -> bool:
-    return host in ("0.0.0.0", "::", "")
-
-
-def _is_address(host: str) -> bool:
-    """Whether a Host header is a plain address: no name can be rebound to that."""
-    name = host.rsplit(":", 1)[0] if not host.endswith("]") else host
-    try:
-        ipaddress.ip_address(name.strip("[]"))
-    except ValueError:
-        return False
-    return True

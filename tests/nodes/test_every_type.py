@@ -11,12 +11,16 @@ import pytest
 
 from hfg.catalogue import Catalogue, installed, undocumented
 from hfg.catalogue.offers import Offer
+from hfg.nodes import buses
 from hfg.nodes._making import holds_reals
 from hfg.registry import find
 from hfg.testing import Trial
 from hfg.testing.usable import try_all
 
 NEEDS: dict[str, str] = {
+    **dict.fromkeys(
+        (f"hfg.nodes.buses:{name}" for name in buses.__all__), "the world outside, which virtual time has not"
+    ),
     "hfg.nodes.estimation:ExtendedKalmanFilter": "a measurement of the size of its matrices",
     "hfg.nodes.estimation:KalmanFilter": "a measurement of the size of its matrices",
     "hfg.nodes.estimation:OmniTwist": "a speed for each of its wheels",

@@ -14,6 +14,7 @@ from hfg.engine.model import Core
 from hfg.engine.model.running_node import ENDED, RunningNode
 from hfg.engine.observing.tables import seconds, table
 from hfg.graph import Graph
+from hfg.nodetypes.counting import Counting
 from hfg.ports.edges import AnyEdge, EventEdge
 
 __all__ = [
@@ -43,6 +44,7 @@ class NodeReport(msgspec.Struct, frozen=True):
       most_under_way: how many of its firings were in progress at once, at most (F14).
       active: A(v).
       ended: whether it has sent END.
+      own: what the node counts itself, such as messages that a connection has lost.
     """
 
     firings: int
@@ -55,6 +57,7 @@ class NodeReport(msgspec.Struct, frozen=True):
     most_under_way: int
     active: bool
     ended: bool
+    own: dict[str, int] = {}
 
 
 class EdgeReport(msgspec.Struct, frozen=True):
@@ -120,6 +123,9 @@ class Report(msgspec.Struct, frozen=True):
         ]
         if edges:
             lines += ["", *table(("edge", "sent", "dropped", "lost", "drained", "untaken", "grown"), edges)]
+        for path, one in self.nodes.items():
+            if one.own:
+                lines += ["", f"{path}: {', '.join(f'{count} {what}' for what, count in one.own.items())}"]
         if self.clocks:
             lines += ["", *table(("group", "clock within"), [(one, seconds(at)) for one, at in self.clocks.items()])]
         if self.lost_activity:
@@ -264,6 +270,7 @@ def node_report(worker: RunningNode) -> NodeReport:
         most_under_way=min(1, counts.firings) if worker.concurrent is None else worker.concurrent.most,
         active=worker.active,
         ended=bool(worker.blocked & ENDED),
+        own=dict(worker.node.statistics()) if isinstance(worker.node, Counting) else {},
     )
 
 

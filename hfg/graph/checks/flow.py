@@ -143,7 +143,7 @@ def signal_rings(flat: FlatGraph) -> Iterator[Problem]:
     """Nodes that need a signal of which they are themselves the cause (rule P7)."""
     if not any(edge.is_event_edge for edge in flat.edges):
         return
-    own = [edge for edge in flat.edges if not edge.is_event_edge or _needs_firing(edge)]
+    own = [edge for edge in flat.edges if not edge.is_event_edge or _needs_firing(flat, edge)]
     successors = _successors(flat, own)
     begun_by_slot = {edge.target.node for edge in flat.edges if edge.target.kind == "slot"}
     synchronous = {
@@ -162,9 +162,12 @@ def signal_rings(flat: FlatGraph) -> Iterator[Problem]:
             )
 
 
-def _needs_firing(edge: FlatEdge) -> bool:
-    """Whether only firings trigger the event; activity, errors and time bring automatic events without a firing."""
-    if edge.source.node < 0 or edge.source.kind != "event":
+def _needs_firing(flat: FlatGraph, edge: FlatEdge) -> bool:
+    """Whether only firings trigger the event.
+
+    Activity, errors and time bring automatic events without a firing, and a do-activity triggers the node's own.
+    """
+    if edge.source.node < 0 or edge.source.kind != "event" or "do" in flat.nodes[edge.source.node].node._type.hooks:
         return False
     return edge.source.name not in ("activated", "deactivated", "failed", "timeout")
 
