@@ -128,9 +128,12 @@ def exists(name: str) -> bool:
     """Return whether a dotted name is a module, or something in one."""
     parts = name.split(".")
     for length in range(len(parts), 0, -1):
+        module = ".".join(parts[:length])
         try:
-            found = importlib.import_module(".".join(parts[:length]))
-        except ModuleNotFoundError:
+            found = importlib.import_module(module)
+        except ModuleNotFoundError as error:
+            if error.name is not None and not module.startswith(error.name):  # it is there, and needs an extra
+                return True
             continue
         for part in parts[length:]:
             if not hasattr(found, part):
