@@ -56,7 +56,7 @@ async def _serve(settings: dict[str, Any], folder: Path) -> int:
         journal = Journal(logs_folder(), session.host)
         journal.open()
         one = Agent(session, ThisComputer(session, settings, journal, folder))
-        with _ending() as ended:
+        with ending() as ended:
             try:
                 await one.open()
                 show.write(f'agent of host "{session.host}" is ready, process {os.getpid()}\n')
@@ -70,7 +70,7 @@ async def _serve(settings: dict[str, Any], folder: Path) -> int:
 
 
 @contextmanager
-def _ending() -> Iterator[asyncio.Event]:
+def ending() -> Iterator[asyncio.Event]:
     """Be told by Ctrl-C and its like; the second one leaves at once, and what was begun ends by itself."""
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
 

@@ -60,8 +60,8 @@ def _plugin(
     if folder.is_symlink() or folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise TargetError(f"{folder} is there already and not empty: hfg new overwrites nothing; take another name")
     words = _words(module) | {"distribution": folder.name}
-    texts = {place: _filled(template, words) for place, template in _PLUGIN.items()} | _PLUGIN_EMPTY
-    _write_all({folder / place.format(**words): text for place, text in texts.items()})
+    texts = {place: filled(template, words) for place, template in _PLUGIN.items()} | _PLUGIN_EMPTY
+    write_all({folder / place.format(**words): text for place, text in texts.items()})
     show.write(f"{folder} is there; try pip install -e {folder}, then hfg nodes {words['Name']} and pytest {folder}\n")
     return 0
 
@@ -70,12 +70,12 @@ def _words(module: str) -> dict[str, str]:
     return {"module": module, "Name": "".join(word.capitalize() for word in module.split("_"))}
 
 
-def _filled(template: str, words: Mapping[str, str]) -> str:
+def filled(template: str, words: Mapping[str, str]) -> str:
     """Return the text of a template; braces of the text itself are doubled in it."""
     return files("hfg.cli").joinpath("templates", f"{template}.txt").read_text("utf-8").format(**words)
 
 
-def _write_all(texts: Mapping[Path, str]) -> None:
+def write_all(texts: Mapping[Path, str]) -> None:
     """Write files that are not there yet, with the folders they lie in."""
     for file, text in texts.items():
         try:
@@ -93,7 +93,7 @@ def _write(named: str, template: str, verb: str) -> int:
         if one.exists() or one.is_symlink():
             raise TargetError(f"{one} is there already: hfg new overwrites nothing; take another name")
     words = _words(file.stem)
-    _write_all({file: _filled(template, words), tests: _filled(f"test_of_{template}", words)})
+    write_all({file: filled(template, words), tests: filled(f"test_of_{template}", words)})
     next_step = f"hfg run {file}" if verb else f"hfg nodes {file}"
     show.write(f"{file} and {tests} are there; try {next_step} and pytest {tests}\n")
     return 0

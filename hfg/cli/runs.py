@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import sys
 import uuid
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
@@ -20,6 +20,8 @@ import typer
 from hfg.cli import show
 from hfg.cli.agent import session_settings
 from hfg.cli.options import AllowOption, ArgOption, ParamOption, SettingsOption, TargetArgument, UntilOption
+from hfg.cli.part import NAME_OF_MAIN
+from hfg.cli.target import load_graph
 from hfg.engine.face.watching import Answer, Question
 from hfg.engine.observing.encoding import encode
 from hfg.errors import HfgError, NoAnswer, QueryRefused, TargetError, TransportError
@@ -104,8 +106,19 @@ def deploy(
     param: ParamOption = None,
     arg: ArgOption = None,
     allow: AllowOption = None,
+    write: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Start nothing; write a Dockerfile, units of systemd and a manifest for Kubernetes into this folder.",
+        ),
+    ] = None,
 ) -> int:
     """Run a graph on an agent; it keeps running when this terminal closes."""
+    if write is not None:
+        if settings is not None or until is not None:
+            raise TargetError("--write starts nothing, so --settings and --until mean nothing to it; leave them out")
+        return _write(write, target, on, {"arg": arg, "param": param, "allow": allow})
     arguments = [] if until is None else ["--until", f"{until!r}"]
     for name, values in (("--param", param), ("--arg", arg), ("--allow", allow)):
         for value in values or ():
@@ -139,6 +152,17 @@ def restart(
     if not slash or not run or not group:
         raise TargetError(f'"{part}" names no group of a run: write RUN/GROUP, as hfg ps shows them')
     return asyncio.run(_restart(settings, run, group))
+
+
+def _write(folder: Path, target: str, on: str | None, options: Mapping[str, list[str] | None]) -> int:
+    from hfg.cli.deploying import Deployment, environment_of, write
+
+    graph = load_graph(target, options["arg"], options["allow"])
+    what = Deployment(graph, target, on or NAME_OF_MAIN, environment_of(options))
+    show.write("".join(f"{file}\n" for file in write(what, folder)))
+    for kept in what.kept():
+        show.sentence(f'the main part keeps state in "{kept}": see to it that this file outlives its container')
+    return 0
 
 
 # --- who is there ---

@@ -21,7 +21,7 @@ import typer.main
 
 _MODULES: Final[Mapping[str, str]] = {
     **{name: name for name in ("run", "check", "convert", "draw", "nodes", "tap", "record", "play", "info", "recover")},
-    **{name: name for name in ("top", "agent")},
+    **{name: name for name in ("top", "agent", "part")},
     **{name: name for name in ("tune", "sweep", "compare")},
     **dict.fromkeys(("deploy", "ps", "logs", "restart", "stop"), "runs"),
     **{name: name for name in ("new", "keys", "studio", "ros")},

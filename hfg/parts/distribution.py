@@ -520,7 +520,8 @@ def distribute(
     if virtual or (len(cutting.parts) == 1 and settings is None):  # groups without nodes
         launcher = LoopLauncher()
     elif settings is not None or any(flat.groups[part].host for part in cutting.parts if part != MAIN):
-        launcher = AgentLauncher(ProcessLauncher({"settings": str(Path(settings).resolve())} if settings else {}))
+        here = ProcessLauncher({"settings": str(Path(settings).resolve())} if settings else {})
+        launcher = AgentLauncher(here, graph.name)
     else:
         launcher = ProcessLauncher()
     if len(cutting.parts) == 1:

@@ -65,7 +65,7 @@ async def open_sessions(settings: dict[str, Any] | None, folder: str) -> tuple[S
 
     Args:
       settings: of the network; None if all parts are on this host.
-      folder: in which the parts on this host meet.
+      folder: in which the parts on this host meet; "" if they meet over the network, too.
 
     Raises:
       TransportError: a session cannot be opened.
@@ -75,7 +75,7 @@ async def open_sessions(settings: dict[str, Any] | None, folder: str) -> tuple[S
         near = await LocalTransport().open(folder=folder)
         return near, near
     session = await open_session("", **settings)
-    if isinstance(session, LocalSession):
+    if isinstance(session, LocalSession) or not folder:
         return session, session
     try:
         return session, await LocalTransport().open(folder=folder, host=session.host)

@@ -5,6 +5,8 @@ requests      requests to them
 agent         starts parts on its host
 hosting       the processes that it uses for this, and their output
 remote_parts  launching by agents
+supervised    one part as a program of its own, for other supervisors
+health        its answers to these
 announcement  a run that other programs can find and control
 """
 

@@ -74,6 +74,11 @@ class _Incarnation:
         self.gone: asyncio.Future[str] = loop.create_future()
         self.task: asyncio.Task[None]
 
+    @property
+    def is_there(self) -> bool:
+        """Whether it has a process."""
+        return self.begun.done() and self.begun.exception() is None and not self.gone.done()
+
     async def end(self) -> None:
         """See to it that it is gone."""
         with contextlib.suppress(HfgError):
@@ -89,14 +94,15 @@ class Agent:
       me: its description of itself.
     """
 
-    def __init__(self, session: Session, computer: Computer) -> None:
+    def __init__(self, session: Session, computer: Computer, me: AgentIs | None = None) -> None:
         """Prepare it.
 
         Args:
           session: of the transport, on which parts of runs find each other.
           computer: the computer that it runs on.
+          me: its description; by default, it serves all parts of the session's host.
         """
-        self.me: AgentIs = myself(session.host)
+        self.me: AgentIs = me or myself(session.host)
         self._session = session
         self._computer = computer
         self._charges: dict[tuple[str, str], _Incarnation] = {}
@@ -118,8 +124,10 @@ class Agent:
         """
         name, session = self.me.host, self._session
         self._realm = realm = Realm(session)
-        if await realm.until(lambda: realm.of(name), _LOOKS_S):
-            other = realm.of(name)[0]
+        if await realm.until(lambda: realm.twins(self.me), _LOOKS_S):
+            other = realm.twins(self.me)[0]
+            if self.me.serves is not None:
+                raise TransportError(f"another program (process {other.process} of its host) serves this part already")
             raise TransportError(
                 f'another agent is already named "{name}" (process {other.process} of its host): stop that '
                 'one, or give this one another name by host = "..." in its settings'
@@ -130,9 +138,9 @@ class Agent:
             {
                 requests.Check: self._check,
                 requests.Start: self._start,
-                requests.Deploy: self._deploy,
+                **({} if self.me.serves else {requests.Deploy: self.deploy}),
                 requests.Begins: self._begins,
-                requests.Wait: self._wait,
+                requests.Wait: self.wait,
                 requests.End: self._end,
                 requests.ReadLog: self._read_log,
             },
@@ -145,7 +153,7 @@ class Agent:
         while True:
             for run in {run for run, part in self._charges if part != _MAIN}:
                 self._look_at(run)
-            twins = [one for one in realm.of(self.me.host) if one.incarnation != self.me.incarnation]
+            twins = realm.twins(self.me)
             if twins and not self._warned:
                 self._warned = True
                 _LOGGER.warning(
@@ -204,9 +212,12 @@ class Agent:
         return self._computer.missing(request.modules)
 
     async def _start(self, order: requests.Start) -> requests.Started:
+        if self.me.serves is not None and order.part != self.me.serves[1]:
+            raise UsageError(f'here is only group "{self.me.serves[1]}", not group "{order.part}"')
         return await self._take((order.run, order.part), order.incarnations[0], order)
 
-    async def _deploy(self, order: requests.Deploy) -> requests.Started:
+    async def deploy(self, order: requests.Deploy) -> requests.Started:
+        """Start the main part of a run."""
         return await self._take((order.run, _MAIN), _FIRST_INCARNATION, order)
 
     async def _take(self, key: tuple[str, str], incarnation: int, order: Order) -> requests.Started:
@@ -262,7 +273,12 @@ class Agent:
             charge.begun.result().begins()
         return requests.Done()
 
-    async def _wait(self, request: requests.Wait) -> requests.Gone:
+    def hosts(self, part: str) -> str:
+        """Return the name of the run whose part has a process here; "" if none has."""
+        return next((run for (run, name), charge in self._charges.items() if name == part and charge.is_there), "")
+
+    async def wait(self, request: requests.Wait) -> requests.Gone:
+        """Wait a limited time until a part is gone."""
         charge = self._of(request)
         if charge is None:
             return requests.Gone(f'the agent of host "{self.me.host}" has no process of it')

@@ -58,15 +58,19 @@ class ThisComputer:
       settings: the settings with which parts open theirs.
       journal: stores the output of processes.
       folder: folder whose modules parts can import, in addition to installed ones.
+      is_apart: other programs serve the other parts on this host; so they share neither folder nor memory with these.
     """
 
-    def __init__(self, session: Session, settings: dict[str, Any], journal: Journal, folder: Path) -> None:
+    def __init__(
+        self, session: Session, settings: dict[str, Any], journal: Journal, folder: Path, *, is_apart: bool = False
+    ) -> None:
         self._session = session
         self._settings = settings
         self._journal = journal
         self._folder = folder
         self._path = [str(folder), *(one for one in sys.path if one)]
         self._standby = Standby(keeps_output=True)
+        self._is_apart = is_apart
         self._places: dict[str, Rendezvous] = {}  # of the parts of each run that are here
 
     async def part(self, order: requests.Start) -> PartProcess:
@@ -82,7 +86,7 @@ class ThisComputer:
             targets={},
             path=self._path,
             parent=os.getpid(),
-            folder=str(self._place(order.run).folder),
+            folder="" if self._is_apart else str(self._place(order.run).folder),
             beat=beat_of(order.run, order.part, incarnation),
             level=order.level,
         )
@@ -237,3 +241,24 @@ class Journal:
             data = stream.read(_LONGEST_CHUNK)
         data = data[: data.rfind(b"\n") + 1]
         return requests.Chunk(data.decode(errors="replace"), begin + len(data))
+
+
+class Passing(Journal):
+    """Passes the output of parts on to this program's own, which its supervisor keeps."""
+
+    def __init__(self) -> None:
+        super().__init__(Path(), "")
+
+    def open(self) -> None:
+        """See `Journal`: there is nothing to be made."""
+
+    def _write(self, file: Path, part: str, lines: list[bytes]) -> None:
+        try:
+            sys.stdout.buffer.write(b"".join(line + b"\n" for line in lines))
+            sys.stdout.buffer.flush()
+        except OSError:
+            pass  # its reader is gone: the run continues
+
+    def read(self, run: str, offset: int) -> requests.Chunk:
+        """See `Journal`: it is elsewhere."""
+        return requests.Chunk("", 0)

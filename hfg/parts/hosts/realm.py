@@ -60,6 +60,7 @@ class AgentIs(msgspec.Struct, frozen=True):
       incarnation: which incarnation of it.
       process: its process id.
       hfg, python: versions.
+      serves: the graph and the group that it is for, "" for the main part; None: all groups of its host.
     """
 
     host: str
@@ -67,13 +68,13 @@ class AgentIs(msgspec.Struct, frozen=True):
     process: int
     hfg: str
     python: str
+    serves: tuple[str, str] | None = None
 
 
-def myself(host: str) -> AgentIs:
+def myself(host: str, serves: tuple[str, str] | None = None) -> AgentIs:
     """Return the description of an agent in this process."""
-    return AgentIs(
-        host, uuid.uuid4().hex[:12], os.getpid(), importlib.metadata.version("hfg"), platform.python_version()
-    )
+    version = importlib.metadata.version("hfg")
+    return AgentIs(host, uuid.uuid4().hex[:12], os.getpid(), version, platform.python_version(), serves)
 
 
 class RunIs(msgspec.Struct, frozen=True):
@@ -126,9 +127,14 @@ class Realm:
             if not waiting.done():
                 waiting.set_result(None)
 
-    def of(self, host: str) -> list[AgentIs]:
-        """Return the agents with a name; normally one."""
-        return [agent for agent in self.agents.values() if agent.host == host]
+    def of(self, host: str, part: tuple[str, str] | None = None) -> list[AgentIs]:
+        """Return the agents with a name that serve a part, given as graph and group, or all parts; normally one."""
+        return [agent for agent in self.agents.values() if agent.host == host and agent.serves in (None, part)]
+
+    def twins(self, me: AgentIs) -> list[AgentIs]:
+        """Return other agents that serve the same."""
+        found = [agent for agent in self.agents.values() if (agent.host, agent.serves) == (me.host, me.serves)]
+        return [agent for agent in found if agent.incarnation != me.incarnation]
 
     async def until(self, true: Callable[[], object], within_s: float | None) -> bool:
         """Wait until a condition on the present programs holds. Return whether it does."""
@@ -144,14 +150,14 @@ class Realm:
         self._changed.add(waiting)
         await waiting
 
-    async def agent(self, host: str, within_s: float | None = FINDS_S) -> AgentIs:
-        """Find the agent of a host.
+    async def agent(self, host: str, within_s: float | None = FINDS_S, part: tuple[str, str] | None = None) -> AgentIs:
+        """Find the agent of a host that serves a part, given as graph and group, or all parts.
 
         Raises:
           TransportError: there is none, or more than one.
         """
-        await self.until(lambda: self.of(host), within_s)
-        found = self.of(host)
+        await self.until(lambda: self.of(host, part), within_s)
+        found = self.of(host, part)
         if not found:
             raise TransportError(self._nobody(host))
         if len(found) > 1:

@@ -41,13 +41,15 @@ class AgentLauncher:
 
     Args:
       here: starts parts without a host, and opens the session.
+      graph: the name of the graph, by which agents that serve one part of it are found.
     """
 
     shares_memory: bool
     is_in_realm = True
 
-    def __init__(self, here: Launcher) -> None:
+    def __init__(self, here: Launcher, graph: str = "") -> None:
         self.shares_memory = here.shares_memory
+        self._graph = graph
         self._here = here
         self._session: Session | None = None
         self._realm: Realm | None = None
@@ -73,19 +75,19 @@ class AgentLauncher:
 
     async def prepare(self, hosts: Mapping[str, str], modules: Mapping[str, str]) -> None:
         """See `Launcher`: all agents are asked at once, and all problems are reported."""
-        abroad = sorted({host for host in hosts.values() if host})
+        abroad = sorted((host, part) for part, host in hosts.items() if host)
         if not abroad:
             return
         own = {module: path for module, path in modules.items() if _is_of_the_program(module)}
-        found = await asyncio.gather(*(self._wrong_with(host, modules, own) for host in abroad))
-        wrong = [sentence for sentences in found for sentence in sentences]
+        found = await asyncio.gather(*(self._wrong_with(host, part, modules, own) for host, part in abroad))
+        wrong = dict.fromkeys(sentence for sentences in found for sentence in sentences)  # an agent may serve several
         if wrong:
             raise TransportError("; and ".join(wrong))
 
-    async def _wrong_with(self, host: str, modules: Mapping[str, str], own: Mapping[str, str]) -> list[str]:
+    async def _wrong_with(self, host: str, part: str, modules: Mapping[str, str], own: Mapping[str, str]) -> list[str]:
         assert self._realm is not None
         try:
-            agent = await self._realm.agent(host)
+            agent = await self._realm.agent(host, part=(self._graph, part))
             if wrong := _versions(agent, myself("")):
                 return [wrong]
             if own:
@@ -128,14 +130,14 @@ class AgentLauncher:
 
     async def _agent(self, part: str, host: str, within_s: float | None) -> AgentIs:
         assert self._realm is not None
-        if within_s is None and not self._realm.of(host):
+        if within_s is None and not self._realm.of(host, (self._graph, part)):
             _LOGGER.warning('group "%s" waits for the agent of host "%s" to be there again', part, host)
-        return await self._realm.agent(host, within_s)
+        return await self._realm.agent(host, within_s, (self._graph, part))
 
     def replaced(self, agent: AgentIs) -> bool:
         """Say whether another incarnation of an agent is there."""
         assert self._realm is not None
-        return any(one.incarnation != agent.incarnation for one in self._realm.of(agent.host))
+        return bool(self._realm.twins(agent))
 
     async def ask(self, agent: AgentIs, request: Request[_T], *, timeout_s: float = 5.0) -> _T:
         """Ask an agent.

@@ -50,7 +50,7 @@ class Instructions(msgspec.Struct, frozen=True):
       targets: other files that hfg itself has imported, by the name of the module.
       path: search path for modules.
       parent: the process that has started it; when it is gone, the folder is no longer needed.
-      folder: the folder in which the parts on this host connect.
+      folder: the folder in which the parts on this host connect; "" if they share neither folder nor memory.
       beat: the key on which the process reports that its event loop is running.
       level: level of the log records that the main program wants.
     """

@@ -147,7 +147,8 @@ async def _serve(begun: Instructions, problem: RunError | None) -> None:
                 raise problem
             return build_graph(message, beside=beside)
 
-        worker = Worker(session, begun.run, begun.part, begun.incarnations, build, near=near)
+        is_apart = not begun.folder
+        worker = Worker(session, begun.run, begun.part, begun.incarnations, build, near=near, is_apart=is_apart)
         handler = _ToMain(asyncio.get_running_loop(), worker.log, begun.level)
         logging.getLogger().addHandler(handler)
         logging.getLogger().setLevel(begun.level)

@@ -57,6 +57,7 @@ class Worker:
       incarnations: its incarnation, and that of the main part.
       build: makes the graph from the received text.
       near: the session that reaches parts on the same host; None if `session` does.
+      is_apart: it shares no memory with parts on the same host, whatever the main part says.
     """
 
     def __init__(
@@ -68,7 +69,9 @@ class Worker:
         build: Callable[[messages.Open], Graph],
         *,
         near: Session | None = None,
+        is_apart: bool = False,
     ) -> None:
+        self._is_apart = is_apart
         self._session = session
         self._near = near or session
         self._run = run
@@ -207,9 +210,9 @@ class Worker:
             edges,
             self._say,
             remembered,
-            shares_memory=message.shares_memory,
+            shares_memory=message.shares_memory and not self._is_apart,
         )
-        self._shares_memory = message.shares_memory
+        self._shares_memory = message.shares_memory and not self._is_apart
 
     def _keeper(self, composition: Composition, kept: bytes | None, keeps_states: bool) -> Checkpointer:
         def keep(number: int, data: bytes) -> None:
