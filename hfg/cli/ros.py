@@ -110,7 +110,7 @@ async def _print(
         looking = run.tap("ros_subscribe.out", size=1_000)
         printed = 0
         async for token in looking:
-            sys.stdout.write(escaped(line_of(token, looking.passed_s, json=json)))
+            show.write(line_of(token, looking.passed_s, json=json))
             sys.stdout.flush()
             printed += 1
             if printed == limit:

@@ -82,12 +82,13 @@ class Server:
 
     Attributes:
       address: what the user opens, with the token.
-      loop: of the thread.
+      loop: of the thread, from `start` on.
       ports: those that are tried if none is given.
       longest: message of a page, in bytes.
       keeps_cookies: a page that comes back to the same port after a restart may enter again.
     """
 
+    loop: asyncio.AbstractEventLoop
     ports: ClassVar[range] = range(8800, 8900)
     longest: ClassVar[int] = LONGEST
     keeps_cookies: ClassVar[bool] = True
@@ -112,7 +113,7 @@ class Server:
         need_guarded(host, encrypted=encrypted, insecure=insecure)
         if certfile is not None:
             _need_secret(keyfile or certfile)
-        self._sockets = _listening(host, self.ports if port is None else [port])
+        self._sockets = _listening(host, [*self.ports, 0] if port is None else [port])
         port = int(self._sockets[0].getsockname()[1])
         if sys.platform == "linux" and any(
             isinstance(one, OwnListener) and not one.is_guarded for one in self._sockets
@@ -132,8 +133,6 @@ class Server:
         self.address = f"{'https' if encrypted else 'http'}://{shown}:{port}/?token={self.entrance.token}"
         app = self.application(door)
         self._server = uvicorn.Server(_config(app, self._sockets, certfile, keyfile, self.longest))
-        # The loop is named because it has to ask `OwnListener` for its connections; that of uvloop accepts them itself.
-        self.loop = asyncio.SelectorEventLoop()
         self._thread = threading.Thread(target=self._live, name="hfg studio server", daemon=True)
 
     def application(self, door: Any) -> Any:
@@ -146,6 +145,8 @@ class Server:
 
     def start(self) -> None:
         """Begin."""
+        # The loop is named because it has to ask `OwnListener` for its connections; that of uvloop accepts them itself.
+        self.loop = asyncio.SelectorEventLoop()
         self._thread.start()
 
     def ask_to_end(self) -> None:
@@ -202,14 +203,14 @@ def _config(
 
 
 def _listening(host: str, ports: Sequence[int]) -> list[socket.socket]:
-    """Take the first free one of the ports, or of several any other one if none is; of "localhost", both addresses.
+    """Take the first free one of the ports; of "localhost", both addresses. Port 0 is any free one.
 
     Browsers and tunnels to "localhost" try both. Another user who has one of the two would learn the token.
     """
     first = "127.0.0.1" if host == "localhost" else host
     others = [one for one in _LOCALHOST if one != first] if first in _LOCALHOST else []
     last: OSError | None = None
-    for one in (*ports, 0) if len(ports) > 1 else ports:
+    for one in ports:
         sockets = []
         try:
             sockets.append(_bound(first, one))

@@ -248,7 +248,7 @@ def test_a_studio_finds_a_port_although_all_usual_ones_are_taken(monkeypatch: py
     async def main() -> None:
         with socket.create_server(("127.0.0.1", 0)) as other:
             port = other.getsockname()[1]
-            monkeypatch.setattr("hfg.studio.serving._PORTS", range(port, port + 1))
+            monkeypatch.setattr("hfg.studio.serving.Server.ports", range(port, port + 1))
             server = Server(StudioDoor(asyncio.get_running_loop(), studio_of(doubling())))
             server.start()
             assert urlsplit(server.address).port not in (port, 0)

@@ -237,8 +237,10 @@ async def test_a_settings_file_names_the_router(router: Router, tmp_path: Path) 
     other, _, keep = listener("by_file", router=router.address, namespace="/", node="ear")
     async with hfg.running(graph) as run, hfg.running(other) as second:
         await until(lambda: publish.statistics()["here"])
-        await run.trigger(say.say, "heard")
-        await until(lambda: keep.kept == ["heard"])
+        while not keep.kept:  # with best effort, what is sent before the way is known is lost
+            await run.trigger(say.say, "heard")
+            await asyncio.sleep(0.05)
+        assert set(keep.kept) == {"heard"}
         run.stop()
         second.stop()
 
