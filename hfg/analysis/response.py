@@ -17,11 +17,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 _ENOUGH: Final = 100_000  # steps of an iteration, and points that are looked at
+_MOST_STEPS: Final = 5_000_000  # some seconds
 _ROUNDING: Final = 1e-9
+
+
+class Effort:
+    """The effort that is left for an analysis: rates in a small file can ask for hours of it (rule L4).
+
+    Attributes:
+      steps: how often the work of one task may still be added up.
+    """
+
+    def __init__(self, steps: int = _MOST_STEPS) -> None:
+        self.steps = steps
+
+    def spend(self, steps: int) -> bool:
+        """Take some of it. Return whether there was enough."""
+        self.steps -= steps
+        return self.steps >= 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +62,11 @@ class Task:
     highest: int = 0
     deadline_s: float = math.inf
     in_order: bool = True
+    work_s: float = field(init=False)
+    """How long all firings of a wave take together."""
 
-    @property
-    def work_s(self) -> float:
-        """How long all firings of a wave take together."""
-        return sum(self.firings_s)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "work_s", sum(self.firings_s))
 
     @property
     def longest_s(self) -> float:
@@ -62,22 +79,35 @@ def utilisation(tasks: Iterable[Task]) -> float:
     return sum(task.work_s / task.period_s for task in tasks)
 
 
-def response_times(tasks: Sequence[Task], policy: str) -> list[float]:
-    """Return a bound for the response time of each task, in seconds; infinity if there is none, or it was not found."""
+def response_times(tasks: Sequence[Task], policy: str, effort: Effort | None = None) -> list[float]:
+    """Return a bound for the response time of each task, in seconds; infinity if there is none, or it was not found.
+
+    Args:
+      tasks: all of one group.
+      policy: of the group.
+      effort: what may be spent; a new one by default. Where it does not suffice, no bound is found.
+    """
+    try:
+        return _bounds(tasks, policy, Effort() if effort is None else effort)
+    except (OverflowError, ValueError):  # a number of waves in it is infinite
+        return [math.inf] * len(tasks)
+
+
+def _bounds(tasks: Sequence[Task], policy: str, effort: Effort) -> list[float]:
     if utilisation(tasks) > 1 + _ROUNDING and policy != "priority":
         return [math.inf] * len(tasks)
-    if policy == "fifo":
-        whole = _fifo(tasks)
-        return [(whole if task.in_order else _busy(tasks)) + task.jitter_s for task in tasks]
     if policy == "priority":
-        return [_priority(tasks, number) for number in range(len(tasks))]
-    busy = _busy(tasks)
-    if policy == "deadline" and _meets_deadlines(tasks, busy):
+        return [_priority(tasks, number, effort) for number in range(len(tasks))]
+    busy = _busy(tasks, effort)
+    if policy == "fifo":
+        whole = _fifo(tasks, busy, effort)
+        return [(whole if task.in_order else busy) + task.jitter_s for task in tasks]
+    if policy == "deadline" and _meets_deadlines(tasks, busy, effort):
         return [task.jitter_s + min(task.deadline_s, busy) for task in tasks]
     return [busy + task.jitter_s for task in tasks]
 
 
-def _busy(tasks: Sequence[Task], first: float = 0.0) -> float:
+def _busy(tasks: Sequence[Task], effort: Effort, first: float = 0.0) -> float:
     """Return how long the processor can be busy without a break, after `first` seconds of other work."""
     begin = first + sum(task.work_s for task in tasks)
 
@@ -85,13 +115,15 @@ def _busy(tasks: Sequence[Task], first: float = 0.0) -> float:
         waves = ((math.ceil((t + task.jitter_s) / task.period_s - _ROUNDING), task) for task in tasks)
         return first + sum(count * task.work_s for count, task in waves)
 
-    return _fixed_point(begin, work_until)
+    return _fixed_point(begin, work_until, len(tasks), effort)
 
 
-def _fixed_point(begin: float, follow: Callable[[float], float]) -> float:
+def _fixed_point(begin: float, follow: Callable[[float], float], cost: int, effort: Effort) -> float:
     """Return the smallest number from `begin` on that is its own follower; infinity if it is not found."""
     now = begin
     for _ in range(_ENOUGH):
+        if not effort.spend(1 + cost):
+            break
         after = follow(now)
         if after <= now + _ROUNDING:
             return now
@@ -111,29 +143,39 @@ def _steps(task: Task, busy: float) -> list[float]:
     return [max(0.0, number * task.period_s - task.jitter_s) for number in range(first, last + 1)]
 
 
-def _moments(tasks: Sequence[Task], busy: float) -> set[float] | None:
+def _are_few(tasks: Sequence[Task], busy: float, effort: Effort) -> bool:
+    """Return whether all work at each of these moments can be added up."""
+    if busy == math.inf:
+        return False
+    moments = sum((busy + task.jitter_s) / task.period_s + 1 for task in tasks)
+    return moments <= _ENOUGH + len(tasks) and effort.spend(math.ceil(moments) * len(tasks))
+
+
+def _moments(tasks: Sequence[Task], busy: float, effort: Effort) -> set[float] | None:
     """Return all these moments; None if they are too many."""
-    if busy == math.inf or sum(busy / task.period_s for task in tasks) > _ENOUGH:
+    if not _are_few(tasks, busy, effort):
         return None
     return {0.0}.union(*(_steps(task, busy) for task in tasks))
 
 
-def _fifo(tasks: Sequence[Task]) -> float:
-    moments = _moments(tasks, _busy(tasks))
+def _fifo(tasks: Sequence[Task], busy: float, effort: Effort) -> float:
+    moments = _moments(tasks, busy, effort)
     if moments is None:
         return math.inf
     return max(sum(_released(task, t) * task.work_s for task in tasks) - t for t in moments)
 
 
-def _priority(tasks: Sequence[Task], number: int) -> float:
+def _priority(tasks: Sequence[Task], number: int, effort: Effort) -> float:
     """Waves that may come first delay it, others only by one firing that has begun."""
+    if not effort.spend(len(tasks)):
+        return math.inf
     me = tasks[number]
     others = [task for index, task in enumerate(tasks) if index != number]
     first = [task for task in others if task.highest >= me.lowest]
     blocking = max((task.longest_s for task in others if task.highest < me.lowest), default=0.0)
     if utilisation([*first, me]) > 1 + _ROUNDING:
         return math.inf
-    busy = _busy([*first, me], blocking)
+    busy = _busy([*first, me], effort, blocking)
     if busy == math.inf:
         return math.inf
     last = me.firings_s[-1] if me.firings_s else 0.0
@@ -143,17 +185,21 @@ def _priority(tasks: Sequence[Task], number: int) -> float:
         begun = _fixed_point(
             own,
             lambda t, own=own: own + sum(_released(task, t) * task.work_s for task in first),  # type: ignore[misc]
+            len(first),
+            effort,
         )
+        if begun == math.inf:
+            return math.inf
         worst = max(worst, begun + last - job * me.period_s + me.jitter_s)
     # beyond a period the next wave has come, whose firings may go ahead of the last ones of this wave
     return worst if worst <= me.period_s else max(worst, busy + me.jitter_s)
 
 
-def _meets_deadlines(tasks: Sequence[Task], busy: float) -> bool:
+def _meets_deadlines(tasks: Sequence[Task], busy: float, effort: Effort) -> bool:
     """Return whether each wave is over by its deadline: no interval holds more work than time."""
     if any(task.deadline_s == math.inf for task in tasks):
         return False
-    if busy == math.inf or sum(busy / task.period_s for task in tasks) > _ENOUGH:
+    if not _are_few(tasks, busy, effort):
         return False
     moments = {
         number * task.period_s + task.deadline_s - task.jitter_s

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import msgspec
 
-from hfg.analysis.response import Task, response_times, utilisation
+from hfg.analysis.response import Effort, Task, response_times, utilisation
 from hfg.analysis.waves import Reach, Wave, reach_of
 from hfg.base.bars import bar
 from hfg.errors import Problem, UsageError
@@ -23,6 +23,7 @@ from hfg.graph.flat.deadlines import declared_deadlines, urgencies
 
 _ROUNDS: Final = 200  # of the iteration over groups
 _MOST_FIRINGS: Final = 1000  # of a node that are kept apart in one wave
+_MOST_REACHED: Final = 500_000  # nodes by all sources with a rate together
 _LOOP: Final = "loop"
 
 
@@ -88,7 +89,8 @@ def analyse_time(graph: Graph, durations: Mapping[str, float] | None = None) -> 
       Bounds under assumptions. They are no guarantee, because durations are declared or measured.
 
     Raises:
-      UsageError: a duration is not a number of seconds, or belongs to no node of the graph.
+      UsageError: a duration is not a number of seconds, or belongs to no node of the graph, or sources with a rate
+        reach more than 500,000 nodes, each counted for each source.
     """
     flat = flatten(graph)
     durations = durations or {}
@@ -107,6 +109,7 @@ class _Analysis:
         self.durations = durations
         self.urgencies = urgencies(flat)
         self.unknown: dict[str, None] = {}
+        self._effort = Effort()
         sources = [node for node in flat.nodes if node.node._type.is_source]
         self.unrated = [node.path for node in sources if node.options.max_rate_hz is None]
         edges_from: list[list[FlatEdge]] = [[] for _ in flat.nodes]
@@ -114,11 +117,17 @@ class _Analysis:
             if edge.source.node >= 0 and edge.target.node >= 0:
                 edges_from[edge.source.node].append(edge)
         self.senders = {index for index, edges in enumerate(edges_from) if edges}
-        self.reaches = [
-            reach_of(flat, node, edges_from, self._processor)
-            for node in sources
-            if node.options.max_rate_hz is not None
-        ]
+        self.reaches: list[Reach] = []
+        reached = 0
+        for node in sources:
+            if node.options.max_rate_hz is not None:
+                self.reaches.append(reach_of(flat, node, edges_from, self._processor))
+                reached += len(self.reaches[-1].into)
+            if reached > _MOST_REACHED:
+                raise UsageError(
+                    f"the sources of the graph reach more than {_MOST_REACHED:,} nodes, each counted for "
+                    "each source, too many to bound their times: look at parts of the graph"
+                )
         self.processors: dict[str, list[Wave]] = {}
         for reach in self.reaches:
             for wave in reach.waves:
@@ -187,10 +196,11 @@ class _Analysis:
         for _ in range(_ROUNDS):
             changed = False
             for waves in self.processors.values():
-                if any(wave.begins_s == math.inf for wave in waves):
+                can_go_on = self._effort.spend(sum(len(wave.nodes) for wave in waves))
+                if not can_go_on or any(wave.begins_s == math.inf for wave in waves):
                     bounds = [math.inf] * len(waves)
                 else:
-                    bounds = response_times([self._task(wave) for wave in waves], self._policy(waves))
+                    bounds = response_times([self._task(wave) for wave in waves], self._policy(waves), self._effort)
                 for wave, bound in zip(waves, bounds, strict=True):
                     changed = changed or bound > wave.response_s + 1e-9
                     wave.response_s = max(bound, wave.response_s)

@@ -10,12 +10,15 @@ import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 from hfg.graph.flat import FlatEdge, FlatGraph, FlatNode
 from hfg.graph.flat.order import strongly_connected
 from hfg.ports.automatic import AUTOMATIC_SLOTS
 
 __all__ = ["Reach", "Wave", "reach_of"]
+
+_MOST_TIMES: Final = 10**12  # that a node does something because of one firing; more is as good as without end
 
 
 @dataclass(eq=False)
@@ -96,11 +99,9 @@ def _order(begin: int, edges_from: Sequence[Sequence[FlatEdge]]) -> list[int]:
             if edge.target.node not in soon:
                 soon[edge.target.node] = len(soon)
                 waiting.append(edge.target.node)
-    successors = [
-        [edge.target.node for edge in edges] if index in soon else [] for index, edges in enumerate(edges_from)
-    ]
-    parts = strongly_connected(successors)
-    return [index for part in reversed(parts) if part[0] in soon for index in sorted(part, key=lambda one: soon[one])]
+    reached = list(soon)  # there may be as many sources as nodes, so nothing else is looked at
+    parts = strongly_connected([[soon[edge.target.node] for edge in edges_from[index]] for index in reached])
+    return [reached[number] for part in reversed(parts) for number in sorted(part)]
 
 
 def _times(begin: int, order: Sequence[int], into: dict[int, list[FlatEdge]]) -> dict[int, tuple[int, int]]:
@@ -120,7 +121,7 @@ def _times(begin: int, order: Sequence[int], into: dict[int, list[FlatEdge]]) ->
                 fires = min(fires, sent)
             elif edge.target.kind == "slot" and edge.target.name not in AUTOMATIC_SLOTS:
                 calls += sent
-        found[index] = (0 if fires == math.inf else int(fires), calls)
+        found[index] = (0 if fires == math.inf else int(min(fires, _MOST_TIMES)), min(calls, _MOST_TIMES))
     return found
 
 

@@ -17,6 +17,7 @@ import msgspec
 
 from hfg.base.bounds import JOURNAL_BYTES
 from hfg.base.token import Token
+from hfg.base.whole import read_plain
 from hfg.engine import Report, Run
 from hfg.engine.observing.encoding import encode
 from hfg.errors import HfgError, UsageError
@@ -126,7 +127,10 @@ def read_recording(file: Path, name: str = "", scores: Sequence[ScoreLike] = ())
         if course.unknown_after is not None:
             side.notes.append(f"activity after {course.unknown_after / 1e9 - info.began:.3f} s is not compared")
         if info.commands:
-            side.graph = msgspec.json.decode(info.commands)
+            try:
+                side.graph = msgspec.json.decode(info.commands, type=list[Any])
+            except (msgspec.DecodeError, RecursionError) as error:
+                side.notes.append(f"the graph, because its description is damaged ({error})")
         side.scores = {score.name: [_score(recording, score)] for score in read_scores(scores, ())} if scores else {}
     return side
 
@@ -154,8 +158,7 @@ def read_report(file: Path) -> Side:
       UsageError: it is not a report, or cannot be read.
     """
     try:
-        with file.open("rb") as stream:
-            data = stream.read(JOURNAL_BYTES.most + 1)
+        data = read_plain(file, JOURNAL_BYTES.most + 1)
         if len(data) > JOURNAL_BYTES.most:
             raise UsageError(f'the report "{file}" is too large; {JOURNAL_BYTES.remedy}')
         report = msgspec.json.decode(data, type=Report)

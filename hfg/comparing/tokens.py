@@ -18,10 +18,11 @@ import msgspec
 from hfg.errors import UsageError
 from hfg.recording import File
 from hfg.recording.messages import EVENTS, MARKERS
-from hfg.recording.reading import number_in
+from hfg.recording.reading import nanoseconds_in, number_in
 
 _MOST_TOKENS: Final = 20_000_000
 _LONGEST: Final = 200
+_LATEST_NS: Final = 2**63 - 1  # a forged time needs more
 _OF_TIME: Final = ("timestamp", "frame_id", "time", "began", "stamp", "sequence", "activity", "port")
 
 
@@ -119,7 +120,7 @@ class _Comparing:
 
     def compare(self, a: File, b: File) -> list[str]:
         """Read both. Return what is left out."""
-        began, count = int(a.began() * 1e9), 0
+        began, count = nanoseconds_in(a.began()), 0
         for seen in _tokens(a):
             one = self.ports.get(seen.port)
             if one is None:
@@ -128,8 +129,8 @@ class _Comparing:
             count += 1
             if count <= _MOST_TOKENS:
                 self._keys[seen.port].append(self._key(seen, seen.at - began))
-                self._places[seen.port].extend((seen.at - began, seen.order))
-        began = int(b.began() * 1e9)
+                self._places[seen.port].extend((min(seen.at - began, _LATEST_NS), seen.order))
+        began = nanoseconds_in(b.began())
         for seen in _tokens(b):
             one = self.ports.get(seen.port)
             if one is not None:
@@ -198,7 +199,7 @@ def _text(message: dict[str, Any]) -> str:
         return str(message["marker"])
     if "value" in message:
         text = msgspec.json.encode(message["value"]).decode()
-    elif "shape" in message:
+    elif isinstance(message.get("shape"), list):
         digest = blake2b(str(message.get("data")).encode(), digest_size=4).hexdigest()
         text = f"image {'x'.join(map(str, message['shape']))}, its bytes have the sum {digest}"
     else:
@@ -210,7 +211,7 @@ def _edges(file: File, port: str) -> list[str]:
     """Return the edges that leave a port, as the recording lists them."""
     try:
         listed = msgspec.json.decode(file.metadata.get("hfg", {}).get("edges", "[]"), type=list[dict[str, Any]])
-    except msgspec.DecodeError:
+    except (msgspec.DecodeError, RecursionError):
         return []
     labels = [str(one.get("edge")) for one in listed]
     source = port.removesuffix(".sent")

@@ -1,13 +1,15 @@
-"""A small graph file makes the analysis of activity take neither all memory nor forever (rule L4)."""
+"""A small graph file makes an analysis take neither all memory nor forever (rule L4)."""
 
 from __future__ import annotations
 
 import pytest
 
 import hfg
-from hfg.analysis import game, reach
-from hfg.errors import GraphError
+from hfg.analysis import game, reach, timing
+from hfg.analysis.response import Effort, Task, response_times
+from hfg.errors import GraphError, UsageError
 from hfg.nodes.activity import Wait
+from hfg.testing.nodes import Relay, Script
 
 pytestmark = [pytest.mark.rule("L4"), pytest.mark.timeout(60)]
 
@@ -49,3 +51,43 @@ def test_the_ways_in_which_edges_may_fail_are_bounded(monkeypatch: pytest.Monkey
         first.done.activates(graph.add(Wait(), name=f"wait_{number}", on_error="disable").begin)
     with pytest.raises(GraphError, match='"first" sends activity in too many ways'):
         hfg.analyse_activity(graph)
+
+
+@pytest.mark.parametrize("policy", ["fifo", "priority", "deadline", "fair"])
+def test_rates_that_ask_for_very_many_steps_have_no_bound(policy: str) -> None:
+    tasks = [Task(1000.0, (1e-5,)), *[Task(0.001, (0.99999e-3 / 20,), deadline_s=0.001)] * 20]
+    effort = Effort(10_000)
+    assert max(response_times(tasks, policy, effort)) == float("inf")
+    assert effort.steps > -1_000_000, "what is looked at is counted before"
+
+
+@pytest.mark.parametrize("policy", ["fifo", "priority", "deadline", "fair"])
+@pytest.mark.parametrize("jitter_s", [0.0, 1e300])
+def test_numbers_beyond_all_numbers_have_no_bound(policy: str, jitter_s: float) -> None:
+    tasks = [Task(1e-308, (0.0,), jitter_s, deadline_s=1.0), Task(float("inf"), (1e300,), deadline_s=1.0)]
+    assert max(response_times(tasks, policy)) == float("inf")
+
+
+def test_signals_that_double_without_end_have_no_bound() -> None:
+    graph = hfg.Graph("doubled")
+    first = graph.add(Script(), max_rate_hz=1)
+    last = graph.add(Relay(), takes_s=1)
+    graph.connect(first.seen, last.say)
+    for _ in range(1100):
+        relay = graph.add(Relay(), takes_s=1)
+        graph.connect(last.said, relay.say)
+        graph.connect(last.said, relay.hand_on)
+        last = relay
+    assert timing.analyse_time(graph).paths[-1].within_s == float("inf")
+
+
+def test_sources_that_reach_too_many_nodes_together_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    graph = hfg.Graph("crowd")
+    relay = graph.add(Relay())
+    for _ in range(6):
+        graph.connect(graph.add(Script(), max_rate_hz=1).seen, relay.say)
+    monkeypatch.setattr(timing, "_MOST_REACHED", 12)
+    timing.analyse_time(graph)
+    monkeypatch.setattr(timing, "_MOST_REACHED", 11)
+    with pytest.raises(UsageError, match="reach more than 11 nodes"):
+        timing.analyse_time(graph)

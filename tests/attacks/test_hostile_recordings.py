@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from hfg import comparing
 from hfg.errors import GraphError, UsageError
 from hfg.graph import commands
 from hfg.recording import File, mcap
@@ -220,3 +221,25 @@ def test_a_file_that_has_become_shorter_is_damaged(tmp_path: Path) -> None:
         file.write_bytes(b"")
         with pytest.raises(Damaged, match="the file has become shorter"):
             recording.layout._head(50_000, recording.layout.size)
+
+
+@pytest.mark.parametrize(
+    ("messages", "about", "made"),
+    [
+        ([(1, token(1))], {}, "nonsense"),
+        ([(1, token(1))], {}, "5"),
+        ([(1, token(1))], {}, "[" * 100_000),
+        ([(1, token(1))], {"edges": "[" * 100_000}, (NODE,)),
+        *[([(1, token(1))], {"began": began}, (NODE,)) for began in ("1e300", "nan", "-inf", "-9e18")],
+        ([(1, b'{"shape": 5}')], {}, (NODE,)),
+    ],
+)
+def test_a_forged_recording_is_compared_in_both_directions(
+    tmp_path: Path, messages: list[tuple[int, bytes]], about: dict[str, str], made: object
+) -> None:
+    good = comparing.read_recording(forged(tmp_path / "good.mcap", (1, token(1)), (1, token(2))))
+    bad = comparing.read_recording(forged(tmp_path / "bad.mcap", *messages, about=about, made=made))
+    for found in (comparing.compare(good, bad), comparing.compare(bad, good)):
+        assert found.first is not None
+        assert "first difference" in "\n".join(found.lines())
+        assert "first that differs" in comparing.page(found)
