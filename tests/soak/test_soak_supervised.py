@@ -120,6 +120,10 @@ def with_agents(field: Field, count: int) -> list[int]:
     """Return the values with agents that live."""
     file = field.folder / "with agents"
     field.settle(HOSTS.__getitem__)
+    others = ", ".join(f'"tls/{SPACES[part]}:7447"' for part in ("eye", "arm"))
+    (field.folder / "main.toml").write_text(  # a host that only starts graphs has no agent
+        f'realm = "{field.folder.name}"\nhost = "{HOSTS["main"]}"\nkey = "cell.key"\nconnect = [{others}]\n'
+    )
     for part in ("eye", "arm"):
         field.begin(part, ["agent", "--settings", f"{part}.toml"])
     time.sleep(3)
@@ -167,4 +171,5 @@ def test_parts_started_in_every_order_and_killed_again_and_again_give_what_agent
     print(f"kills {kills}, orders {len(rounds)}, values {len(found)}, lines written twice {lines - len(found)}")
     assert list(found.values()) == totals(len(found))
     assert codes == [0, 0]
-    assert with_agents(field, len(found)) == list(found.values())
+    few = min(len(found), 200)
+    assert with_agents(field, few) == list(found.values())[:few]
