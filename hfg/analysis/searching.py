@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from typing import Final
 
 from hfg.analysis.places import singles
 from hfg.analysis.playing import Play
 from hfg.analysis.rules import Rule
 
 __all__ = ["Premise", "Searched", "pairs_together", "search"]
+
+_MOST_WORK: Final = 3_000_000  # pairs of places that are looked at: some seconds
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,8 @@ def search(play: Play, limit: int, premises: Collection[Premise] = ()) -> Search
 def pairs_together(play: Play) -> dict[int, int]:
     """Return for each place that may be marked the places that may be marked with it, as bits of their first bit.
 
+    Where that is too much work, all places may be marked with all: then little is proved, but nothing wrong (rule L4).
+
     A place that is in its own set may hold two tokens. Places of the right of A3 take part, those of -1 do not: they
     take activity away, and what is left out then only makes the relation larger.
     """
@@ -123,10 +128,11 @@ def _first_bits(play: Play) -> int:
 
 def _closed(play: Play, steps: list[tuple[int, list[int]]], free: list[list[int]]) -> dict[int, int]:
     together: dict[int, int] = {}
-    changed = True
+    changed, work = True, 0
 
     def mark(places: list[int], others: int) -> None:
-        nonlocal changed
+        nonlocal changed, work
+        work += len(places)
         for number, place in enumerate(places):
             if place not in together:
                 together[place] = 0
@@ -137,6 +143,7 @@ def _closed(play: Play, steps: list[tuple[int, list[int]]], free: list[list[int]
             if new & ~together[place]:
                 together[place] |= new
                 changed = True
+                work += new.bit_count()
                 for low in singles(new):
                     together[low] = together.get(low, 0) | place
 
@@ -149,6 +156,9 @@ def _closed(play: Play, steps: list[tuple[int, list[int]]], free: list[list[int]
         for places in free:
             mark(places, everything & ~places[0] if len(places) == 1 else everything)
         for before, places in steps:
+            if work > _MOST_WORK:
+                everything = play.mask & _first_bits(play)
+                return dict.fromkeys(singles(everything), everything)
             if before in together:
                 mark(places, together[before])
     return together

@@ -5,9 +5,11 @@ from __future__ import annotations
 import pytest
 
 import hfg
-from hfg.analysis import game, reach, timing
+from hfg.analysis import game, reach, searching, timing
+from hfg.analysis.playing import Play
 from hfg.analysis.response import Effort, Task, response_times
 from hfg.errors import GraphError, UsageError
+from hfg.graph.flat import flatten
 from hfg.nodes.activity import Wait
 from hfg.testing.nodes import Relay, Script
 
@@ -91,3 +93,20 @@ def test_sources_that_reach_too_many_nodes_together_are_refused(monkeypatch: pyt
     monkeypatch.setattr(timing, "_MOST_REACHED", 11)
     with pytest.raises(UsageError, match="reach more than 11 nodes"):
         timing.analyse_time(graph)
+
+
+def test_where_pairs_of_places_are_too_much_work_all_may_be_active_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seventy nodes that all activate each other kept it busy for minutes."""
+    graph = hfg.Graph()
+    first, second = (graph.add(Wait(), name=name) for name in ("first", "second"))
+    graph.start.activates(first.begin)
+    first.done.activates(second.begin)
+    second.done.activates(first.begin)
+    made = game.Game(flatten(graph))
+    play = Play(made, made.nodes)
+    exact = searching.pairs_together(play)
+    monkeypatch.setattr(searching, "_MOST_WORK", 0)
+    all_of_them = searching.pairs_together(play)
+    assert any(others != sum(all_of_them) for others in exact.values())
+    assert set(exact) <= set(all_of_them)
+    assert set(all_of_them.values()) == {sum(all_of_them)}
