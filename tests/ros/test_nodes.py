@@ -17,6 +17,7 @@ from hfg.ros.connection import Connection
 from hfg.ros.messages import action, message, service
 from hfg.ros.wire import Entity, Qos
 from tests.ros.conftest import Router, until
+from tests.ros.ends import Keep, Say
 from tests.transports.zenoh.conftest import free_port
 
 pytestmark = [pytest.mark.slow, pytest.mark.asyncio]
@@ -24,22 +25,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.asyncio]
 STRING = "std_msgs/msg/String"
 SET_BOOL = service("std_srvs/srv/SetBool")
 FIBONACCI = action("example_interfaces/action/Fibonacci")
-
-
-class Say(hfg.Node):
-    out = hfg.Event(Any)
-
-    @hfg.slot
-    def say(self, value: Any) -> None:
-        self.out.trigger(value)
-
-
-class Keep(hfg.Node):
-    value = hfg.Input(Any)
-    kept = hfg.State(factory=list[Any])
-
-    def process(self, value: Any) -> None:
-        self.kept.append(value)
 
 
 class Answer(hfg.Node):

@@ -13,6 +13,7 @@ from hfg.geometry import LaserScan
 from hfg.nodes.ros import RosPublish, RosService, RosServiceClient, RosSubscribe
 from hfg.ros.messages import message, service
 from tests.ros.conftest import PEERS, Process, Router, python_with, until
+from tests.ros.ends import Keep, Say
 
 pytestmark = [pytest.mark.slow, pytest.mark.asyncio]
 
@@ -26,22 +27,6 @@ VALUES: dict[str, tuple[str, Any]] = {
     "twist": ("geometry_msgs/msg/Twist", TWIST),
     "scan": ("sensor_msgs/msg/LaserScan", SCAN),
 }
-
-
-class Say(hfg.Node):
-    out = hfg.Event(Any)
-
-    @hfg.slot
-    def say(self, value: Any) -> None:
-        self.out.trigger(value)
-
-
-class Keep(hfg.Node):
-    value = hfg.Input(Any)
-    kept = hfg.State(factory=list[Any])
-
-    def process(self, value: Any) -> None:
-        self.kept.append(value)
 
 
 class Flip(hfg.Node):

@@ -40,15 +40,8 @@ class RosAction(RosNode):
       rejected: the server does not take the goal.
       name: of the action: "/absolute", "relative" to the namespace or "~/private".
       type: of the action, "nav2_msgs/action/NavigateToPose".
-      router: address of the Zenoh router, "tcp/localhost:7447", or a settings file (".toml") that names one; empty:
-        HFG_ROS_ROUTER.
-      domain: number of the domain; -1: ROS_DOMAIN_ID, else 0.
-      namespace: of the node in ROS, "/robot1"; empty: HFG_ROS_NAMESPACE, else none.
-      node: its name in ROS; empty: the name of the graph.
 
     Raises:
-      UsageError: a name, type or domain cannot be used, or no router is named.
-      TransportError: the address of the router cannot be used.
       EncodingError: a goal is not of the type.
     """
 

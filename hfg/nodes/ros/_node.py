@@ -39,6 +39,10 @@ class RosNode(Node):
       domain: number of the domain; -1: ROS_DOMAIN_ID, else 0.
       namespace: of the node in ROS, "/robot1"; empty: HFG_ROS_NAMESPACE, else none.
       node: its name in ROS; empty: the name of the graph. Nodes of one name are one node of ROS.
+
+    Raises:
+      UsageError: a name, type or domain cannot be used, or no router is named.
+      TransportError: the address of the router cannot be used.
     """
 
     router = Parameter("")

@@ -36,15 +36,8 @@ class RosService(RosNode):
       type: of the service, "std_srvs/srv/SetBool".
       timeout_s: how long the graph may take; then the client is refused.
       depth: how many requests wait; more are refused.
-      router: address of the Zenoh router, "tcp/localhost:7447", or a settings file (".toml") that names one; empty:
-        HFG_ROS_ROUTER.
-      domain: number of the domain; -1: ROS_DOMAIN_ID, else 0.
-      namespace: of the node in ROS, "/robot1"; empty: HFG_ROS_NAMESPACE, else none.
-      node: its name in ROS; empty: the name of the graph.
 
     Raises:
-      UsageError: a name, type or domain cannot be used, or no router is named.
-      TransportError: the address of the router cannot be used.
       EncodingError: an answer is not of the type.
     """
 
@@ -193,15 +186,8 @@ class RosServiceClient(RosNode):
       name: its name: "/absolute", "relative" to the namespace or "~/private".
       type: of the service, "std_srvs/srv/SetBool".
       timeout_s: see above.
-      router: address of the Zenoh router, "tcp/localhost:7447", or a settings file (".toml") that names one; empty:
-        HFG_ROS_ROUTER.
-      domain: number of the domain; -1: ROS_DOMAIN_ID, else 0.
-      namespace: of the node in ROS, "/robot1"; empty: HFG_ROS_NAMESPACE, else none.
-      node: its name in ROS; empty: the name of the graph.
 
     Raises:
-      UsageError: a name, type or domain cannot be used, or no router is named.
-      TransportError: the address of the router cannot be used.
       EncodingError: a value is not of the type.
       NoAnswer: no server is there, or no answer has come; `on_error` decides what follows.
       QueryRefused: the server answers with an error.

@@ -36,15 +36,6 @@ class RosSubscribe(RosNode):
       durability: "transient_local": begin with what publishers of that kind have kept.
       reliability: what others see; messages come over TCP either way.
       depth: how many messages wait here, and how many kept ones are asked for; 0: 10,000.
-      router: address of the Zenoh router, "tcp/localhost:7447", or a settings file (".toml") that names one; empty:
-        HFG_ROS_ROUTER.
-      domain: number of the domain; -1: ROS_DOMAIN_ID, else 0.
-      namespace: of the node in ROS, "/robot1"; empty: HFG_ROS_NAMESPACE, else none.
-      node: its name in ROS; empty: the name of the graph.
-
-    Raises:
-      UsageError: a name, type or domain cannot be used, or no router is named.
-      TransportError: the address of the router cannot be used.
     """
 
     out = Output(Any)
@@ -117,15 +108,8 @@ class RosPublish(RosNode):
       durability: "transient_local": the last `depth` messages are kept for those who subscribe later.
       reliability: "best_effort": never wait; Zenoh drops what finds no room, which subscribers see as a gap.
       depth: see durability; 0: 10,000.
-      router: address of the Zenoh router, "tcp/localhost:7447", or a settings file (".toml") that names one; empty:
-        HFG_ROS_ROUTER.
-      domain: number of the domain; -1: ROS_DOMAIN_ID, else 0.
-      namespace: of the node in ROS, "/robot1"; empty: HFG_ROS_NAMESPACE, else none.
-      node: its name in ROS; empty: the name of the graph.
 
     Raises:
-      UsageError: a name, type or domain cannot be used, or no router is named.
-      TransportError: the address of the router cannot be used.
       EncodingError: a value is not of the type.
     """
 
